@@ -26,9 +26,11 @@ def read_camera(camera: Any, scene: Any, report: Report) -> dict[str, Any]:
     if data.type == "ORTHO":
         if data.dof.use_dof:
             report.warn(where, "an orthographic camera has no depth of field")
-        move, half = np.eye(4), size[0] / 2
+        move, half = np.eye(4), size / 2
         move[:2, 3] = middle
-        return {"type": "orthographic", "to_world": to_world @ move @ _TURN @ np.diag([half, half, half, 1.0]), "film": film}
+        # The height of an orthographic view follows from its width and the number of square pixels.
+        half[1] *= film["width"] / film["height"]
+        return {"type": "orthographic", "to_world": to_world @ move @ _TURN @ np.diag([*half, half[0], 1.0]), "film": film}
     sensor = {
         "type": "perspective",
         "to_world": to_world @ _TURN,
@@ -58,16 +60,16 @@ def _lens(camera: Any, where: str, report: Report) -> dict[str, float]:
         report.warn(where, "the lens is round: blades and ratio of the aperture have no effect")
     distance = dof.focus_distance
     if dof.focus_object:
-        from_camera = np.array(camera.matrix_world.inverted() @ dof.focus_object.matrix_world.translation)
-        distance = abs(from_camera[2])
+        # Along the axis of the camera, whose scale has no effect.
+        axis = camera.matrix_world.to_3x3().col[2].normalized()
+        distance = abs(axis.dot(dof.focus_object.matrix_world.translation - camera.matrix_world.translation))
     # The focal length is in millimetres, and units of the scene are metres.
     return {"aperture_radius": camera.data.lens * 1e-3 / (2 * dof.aperture_fstop), "focus_distance": max(distance, 1e-5)}
 
 
 def resolution(render: Any) -> tuple[int, int]:
     """Width and height of the full image in pixels."""
-    factor = render.resolution_percentage / 100
-    return max(int(render.resolution_x * factor), 1), max(int(render.resolution_y * factor), 1)
+    return tuple(max(n * render.resolution_percentage // 100, 1) for n in (render.resolution_x, render.resolution_y))
 
 
 def read_film(render: Any) -> dict[str, Any]:
@@ -76,8 +78,9 @@ def read_film(render: Any) -> dict[str, Any]:
     film = {"type": "hdrfilm", "width": width, "height": height,
             "rfilter": {"type": "gaussian", "stddev": max(render.filter_size / 3, 0.1)}}
     if render.use_border:
-        left, right = int(render.border_min_x * width), int(render.border_max_x * width)
-        bottom, top = int(render.border_min_y * height), int(render.border_max_y * height)
+        # Blender multiplies in single precision, in which 0.7 times 10 is 7.
+        left, right = (int(np.float32(x) * np.float32(width)) for x in (render.border_min_x, render.border_max_x))
+        bottom, top = (int(np.float32(y) * np.float32(height)) for y in (render.border_min_y, render.border_max_y))
         film.update(crop_offset_x=left, crop_offset_y=height - top,
                     crop_width=max(right - left, 1), crop_height=max(top - bottom, 1))
     return film

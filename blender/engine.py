@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import tempfile
+import time
+import traceback
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +12,7 @@ import bpy
 import numpy as np
 
 from .camera import resolution
-from .files import write_scene
+from .images import with_copies
 from .report import Refused
 from .scene import SceneReader
 from .settings import changed_parameters, integrator_text
@@ -42,8 +44,10 @@ class EtendueEngine(bpy.types.RenderEngine):
         with tempfile.TemporaryDirectory(prefix="etendue-") as folder:
             try:
                 self._render(depsgraph, Path(folder))
-            except (Refused, RuntimeError, ValueError, ImportError, MemoryError) as e:
-                message = f"etendue: {e}"
+            except Exception as e:
+                if not isinstance(e, (Refused, RuntimeError, ValueError, ImportError, MemoryError)):
+                    traceback.print_exc()  # of what should not happen
+                message = f"etendue: {e or type(e).__name__}"
                 self.report({"ERROR"}, message)
                 self.error_set(message)
 
@@ -52,10 +56,13 @@ class EtendueEngine(bpy.types.RenderEngine):
         reader, scene = SceneReader(depsgraph, folder), depsgraph.scene
         description = reader.read()
         if EtendueEngine.destination is not None:
+            import etendue as et
+
             settings = scene.etendue
-            sampler = {"type": "independent", "sample_count": settings.samples}
-            description["sensor"]["sampler"] = sampler
-            write_scene(description, {"type": settings.integrator, **changed_parameters(settings)}, self.destination)
+            description["sensor"]["sampler"] = {"type": "independent", "sample_count": settings.samples}
+            description["integrator"] = {"type": settings.integrator, **changed_parameters(settings)}
+            description = with_copies(description, self.destination)
+            et.load_dict(description, folder=self.destination).save(self.destination / "scene.xml")
         else:
             self._trace(description, depsgraph)
         for warning in reader.report.warnings:
@@ -68,24 +75,40 @@ class EtendueEngine(bpy.types.RenderEngine):
         built, scene = et.load_dict(description).build(), depsgraph.scene
         settings = scene.etendue
         result = self.begin_result(0, 0, built.width, built.height, layer=depsgraph.view_layer.name)
+        newest: list[tuple[et.Progress, np.ndarray | None]] = []
 
-        def show(progress: et.Progress) -> bool:
+        def keep(progress: et.Progress) -> None:
+            newest[:] = [(progress, None if self.is_animation else progress.image)]
+
+        def show(progress: et.Progress, image: np.ndarray | None) -> None:
             self.update_progress(progress.fraction or 0.0)
             error = "" if progress.error is None else f", error {progress.error:.3f}"
             self.update_stats("", f"{progress.passes} samples{error}")
-            if not self.is_animation:
-                _fill(result, "Combined", _with_alpha(progress.image))
+            if image is not None:
+                _fill(result, "Combined", _with_alpha(image))
                 self.update_result(result)
-            return not self.is_cancelled()
 
+        is_cancelled = False
         try:
-            image = et.render(
+            # On a thread of its own, so that cancelling need not wait for the end of a pass.
+            with et.start(
                 built, integrator_text(settings), spp=settings.samples, time=settings.time or None, seed=settings.seed,
                 threads=scene.render.threads if scene.render.threads_mode == "FIXED" else 0,
-                aovs=[name.lower() for name, *_ in PASSES], callback=show, progress=False,
-            )
+                aovs=[name.lower() for name, *_ in PASSES], callback=keep,
+            ) as job:
+                while not job.done and not is_cancelled:
+                    time.sleep(0.02)
+                    if newest:
+                        show(*newest.pop())
+                    is_cancelled = self.is_cancelled()
+            image = job.result()
+        except et.RenderError as e:
+            self.report({"WARNING"}, f"etendue: {e.__cause__}; the image is that of {e.result.passes} samples")
+            image = e.result
         except BaseException:
-            self.end_result(result, cancel=True)
+            self.end_result(result, cancel=not is_cancelled)
+            if is_cancelled:  # before the end of the first pass: the image is black
+                return
             raise
         _fill(result, "Combined", _with_alpha(image.image))
         _fill(result, "Normal", image.aov["normal"])

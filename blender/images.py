@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import struct
 import zlib
 from pathlib import Path
@@ -19,6 +20,25 @@ _READABLE = {".exr", ".png", ".jpg", ".jpeg", ".hdr", ".pfm", ".tga", ".bmp"}
 def plain_name(name: str) -> str:
     """A name of letters, digits, - and _ for files and ids."""
     return re.sub(r"[^A-Za-z0-9_-]+", "_", name)
+
+
+def with_copies(description: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """The description with copies of its image files in the folder textures of another one, to which their names are relative."""
+    copies: dict[str, str] = {}
+
+    def copied(name: str) -> str:
+        if name not in copies:
+            copies[name] = f"textures/{len(copies)}-{Path(name).name}"
+            (folder / "textures").mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(name, folder / copies[name])
+        return copies[name]
+
+    def visit(value: Any) -> Any:
+        if not isinstance(value, dict):
+            return value
+        return {k: copied(v) if k == "filename" else visit(v) for k, v in value.items()}
+
+    return visit(description)
 
 
 class ImageFiles:

@@ -20,8 +20,12 @@ from .values import Color, Values, as_color, is_texture
 _TURN = np.diag([-1.0, 1.0, -1.0, 1.0])
 
 
-def read_light(light: Any, to_world: np.ndarray, values: Values) -> dict[str, Any]:
-    """The emitter, or the shape that emits, of a light."""
+def read_light(light: Any, to_world: np.ndarray, values: Values) -> dict[str, Any] | None:
+    """The emitter, or the shape that emits, of a light; None for the portals of Cycles, which are hints where to sample."""
+    if light.type == "AREA" and getattr(getattr(light, "cycles", None), "is_portal", False):
+        return None
+    if not light.use_shadow:
+        values.report.warn(values.where, "a light without shadows casts shadows")
     color = _color(light, values)
     if light.type == "POINT":
         return _point(light, to_world, color)

@@ -6,11 +6,13 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
+from .albedos import conductor, refraction_gain, rough_diffuse, schlick_mean
 from .images import ImageFiles
 from .nodes import Input, Output, surface_output, tree_of
 from .principled import principled
 from .report import Refused, Report
-from .surfaces import (BLACK, Surface, diffuse, dielectric, glossy, mixed, reflecting, rough, summed, with_normal)
+from .surfaces import (BLACK, SMOOTH, Surface, diffuse, dielectric, glass_gain, glossy, mixed, reflecting, rough, summed,
+                       weighted_sum, with_normal)
 from .values import Values, as_color, is_black, is_texture, parameter, product
 
 
@@ -60,8 +62,9 @@ def read_shader(i: Input, values: Values) -> Surface:
 def _diffuse(node: Output, values: Values) -> Surface:
     color, roughness = values.color(node.input("Color")), values.constant(node.input("Roughness"), node)
     if roughness > 0:
-        bsdf = {"type": "orennayar", "reflectance": parameter(color), "sigma": math.degrees(roughness)}
-        return with_normal(Surface(reflecting(bsdf)), node, values)
+        sigma, factor, albedo = rough_diffuse(min(roughness, 1.0), (1.0, 1.0, 1.0) if is_texture(color) else color)
+        bsdf = {"type": "orennayar", "sigma": math.degrees(sigma), "reflectance": parameter(color if is_texture(color) else albedo)}
+        return with_normal(Surface(weighted_sum([(factor, reflecting(bsdf))])), node, values)
     return with_normal(diffuse(color), node, values)
 
 
@@ -75,29 +78,39 @@ def _glossy(node: Output, values: Values) -> Surface:
 
 def _metallic(node: Output, values: Values) -> Surface:
     roughness = values.number(node.input("Roughness"))
+    if node.has("Thin Film Thickness") and node.input("Thin Film Thickness").value:
+        values.warn(node, "Thin Film Thickness has no effect")
+    facets = rough(roughness, node, values, values.constant(node.input("Anisotropy"), node))
     if node.node.fresnel_type == "F82":
-        values.warn(node, "Edge Tint has no effect")
-        color = values.color(node.input("Base Color"))
-        bsdf = {"type": "principled", "metallic": 1.0, "roughness": roughness, "base_color": parameter(color)}
-        return with_normal(glossy(bsdf, color, roughness, node), node, values)
-    eta, k = (as_color(node.input(name).value) for name in ("IOR", "Extinction"))
-    facets = rough(roughness, node, values)
+        color, edge = values.color(node.input("Base Color")), values.color(node.input("Edge Tint"))
+        if is_texture(color) or is_texture(edge):
+            values.warn(node, "Edge Tint has no effect beside a texture")
+            bsdf = {"type": "principled", "metallic": 1.0, "roughness": parameter(roughness), "base_color": parameter(color)}
+            return with_normal(glossy(bsdf, color, roughness, node), node, values)
+        # The tint is a factor of Schlick's reflectance at 82 degrees.
+        pairs = [conductor(c, (c + (1 - c) * (6 / 7) ** 5) * t) for c, t in zip(color, edge)]
+        eta, k = (tuple(pair[i] for pair in pairs) for i in (0, 1))
+    else:
+        eta, k = (as_color(values.color(node.input(name))) for name in ("IOR", "Extinction"))
     bsdf = {"type": "roughconductor" if facets else "conductor", **facets, "eta": parameter(eta), "k": parameter(k)}
-    color = tuple(((n - 1) ** 2 + x * x) / ((n + 1) ** 2 + x * x) for n, x in zip(eta, k))
+    color = tuple(schlick_mean(((n - 1) ** 2 + x * x) / ((n + 1) ** 2 + x * x)) for n, x in zip(eta, k))
     return with_normal(glossy(bsdf, color, roughness, node), node, values)
 
 
 def _glass(node: Output, values: Values) -> Surface:
-    color, roughness = parameter(values.color(node.input("Color"))), values.number(node.input("Roughness"))
+    color, roughness = values.color(node.input("Color")), values.number(node.input("Roughness"))
     ior = values.constant(node.input("IOR"), node)
-    bsdf = dielectric(ior, rough(roughness, node, values))
-    return with_normal(Surface({**bsdf, "specular_reflectance": color, "specular_transmittance": color}), node, values)
+    color = product(color, glass_gain(ior, roughness, node))
+    return with_normal(Surface(dielectric(ior, rough(roughness, node, values), color, color)), node, values)
 
 
 def _refraction(node: Output, values: Values) -> Surface:
-    surface = _glass(node, values)
-    surface.bsdf["specular_reflectance"] = 0.0
-    return surface
+    """Blender's has no Fresnel term: it is that of glass, divided by the mean share that is transmitted."""
+    color, roughness = values.color(node.input("Color")), values.number(node.input("Roughness"))
+    ior = values.constant(node.input("IOR"), node)
+    alpha = SMOOTH**2 if is_texture(roughness) else max(roughness, SMOOTH) ** 2
+    color = product(color, refraction_gain(max(ior, 1 / ior), alpha))
+    return with_normal(Surface(dielectric(ior, rough(roughness, node, values), 0.0, color)), node, values)
 
 
 def _translucent(node: Output, values: Values) -> Surface:

@@ -2,7 +2,7 @@
 
 The structure is Blender's: metal, or else glass, or else a dielectric surface over a diffuse base, under a clear coat. In
 Blender the diffuse base loses what the rough surface reflects toward the viewer. Here it is that of `plastic`, which loses
-what a smooth surface reflects: `roughplastic` would lose light that is scattered between facets, too.
+what a smooth surface reflects, times a factor with which it loses as much as in Blender on average.
 """
 
 from __future__ import annotations
@@ -10,9 +10,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from .albedos import mean_reflectance, microfacets, schlick_mean, several_times
 from .nodes import Output
-from .surfaces import Surface, dielectric, diffuse, glossy, mixed, reflecting, rough, weighted_sum, with_normal
-from .values import Value, Values, as_color, is_black, is_texture, parameter, product
+from .surfaces import (Surface, dielectric, diffuse, glass_gain, glossy, mixed, reflecting, rough, scatters_again,
+                       weighted_sum, with_normal)
+from .values import Value, Values, as_color, is_black, is_texture, luminance, parameter, product
 
 _LEFT_OUT = ("Subsurface Weight", "Sheen Weight", "Thin Film Thickness", "Diffuse Roughness", "Anisotropic Rotation")
 
@@ -43,7 +45,12 @@ def _plastic(node: Output, values: Values, color: Value, roughness: Value) -> Su
     if not facets:
         return Surface(reflecting({**base, "specular_reflectance": parameter(tint)}))
     base = reflecting({**base, "specular_reflectance": 0.0})
-    return Surface(weighted_sum([(1.0, base), (1.0, _reflection(eta, facets, tint))]))
+    smooth, share, gain = mean_reflectance(eta), 1.0, 1.0
+    if not is_texture(roughness):
+        gain = several_times(smooth, roughness**2) if scatters_again(roughness, node) else 1.0
+        lost = microfacets(roughness**2, eta)[0] * gain * (1.0 if is_texture(tint) else luminance(tint))
+        share = (1 - lost) / (1 - smooth)
+    return Surface(weighted_sum([(share, base), (gain, _reflection(eta, facets, tint))]))
 
 
 def _reflection(eta: float, facets: dict[str, Any], tint: Value = 1.0) -> dict[str, Any]:
@@ -59,7 +66,8 @@ def _metal(node: Output, values: Values, color: Value, roughness: Value) -> Surf
     anisotropy = values.constant(node.input("Anisotropic"), node)
     if anisotropy:
         parameters["anisotropic"] = anisotropy
-    return glossy({"type": "principled", **parameters}, color, roughness, node)
+    mean = color if is_texture(color) else tuple(schlick_mean(c) for c in color)
+    return glossy({"type": "principled", **parameters}, mean, roughness, node)
 
 
 def _glass(node: Output, values: Values, color: Value, roughness: Value) -> Surface:
@@ -68,8 +76,9 @@ def _glass(node: Output, values: Values, color: Value, roughness: Value) -> Surf
     if is_texture(color):
         parameters = {"spec_trans": 1.0, "base_color": color, "roughness": parameter(roughness), "eta": ior}
         return Surface({"type": "principled", **parameters})
-    root = tuple(math.sqrt(max(c, 0.0)) for c in color)
-    return Surface({**dielectric(ior, rough(roughness, node, values)), "specular_transmittance": parameter(root)})
+    gain = glass_gain(ior, roughness, node)
+    root = tuple(math.sqrt(max(c, 0.0)) * gain for c in color)
+    return Surface(dielectric(ior, rough(roughness, node, values), gain, root))
 
 
 def _coated(node: Output, values: Values, base: Surface) -> Surface:
@@ -84,15 +93,3 @@ def _coated(node: Output, values: Values, base: Surface) -> Surface:
     coated = with_normal(coat, node, values, "Coat Normal")
     base.bsdf = weighted_sum([(1 - weight * mean_reflectance(ior), base.bsdf), (weight, coated.bsdf)])
     return base
-
-
-def mean_reflectance(ior: float) -> float:
-    """The reflectance of a dielectric averaged over cosine-weighted directions: the mean of F over cos² θ."""
-    steps = 256
-    return sum(_fresnel(math.sqrt((i + 0.5) / steps), ior) for i in range(steps)) / steps
-
-
-def _fresnel(cos: float, ior: float) -> float:
-    cos_t = math.sqrt(max(1 - (1 - cos * cos) / (ior * ior), 0.0))
-    s, p = (cos - ior * cos_t) / (cos + ior * cos_t), (ior * cos - cos_t) / (ior * cos + cos_t)
-    return (s * s + p * p) / 2

@@ -1,6 +1,6 @@
 """A Blender scene as a description: nested dicts as et.load_dict() takes them, with meshes as arrays.
 
-Nothing here renders or imports etendue. engine.py builds the description in memory, and files.py writes it to a folder.
+Nothing here renders or imports etendue. engine.py renders the description, or saves it to a folder.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from .values import Values
 from .world import read_world
 
 _GEOMETRY = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+_RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
 _IGNORED = {"EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE", "LIGHT"}
 
 
@@ -53,6 +54,7 @@ class SceneReader:
             if scene.camera is None:
                 raise Refused("the scene has no camera")
             sensor = read_camera(scene.camera.evaluated_get(self._depsgraph), scene, self.report)
+        self._warn_of_render_settings(scene.render)
         self._read_world(scene.world)
         for instance in self._depsgraph.object_instances:
             self._read_instance(instance)
@@ -72,16 +74,39 @@ class SceneReader:
         to_world = np.array(instance.matrix_world, dtype=float)
         if thing.type == "LIGHT":
             values = Values(f'light "{thing.name}"', self._images, self.report)
-            name = self._new_name("light-" + plain_name(thing.name))
-            self._objects[name] = read_light(thing.data, to_world, values)
+            emitter = read_light(thing.data, to_world, values)
+            if emitter is not None:
+                self._objects[self._new_name("light-" + plain_name(thing.name))] = emitter
         elif thing.type in _GEOMETRY:
-            # The graph makes objects anew for each step, but not their data.
-            key = (thing.data.as_pointer(), tuple(s.material.name_full if s.material else "" for s in thing.material_slots))
+            self._warn_of_ray_visibility(thing)
+            # The graph makes objects anew for each step, but not their data. Modifiers give an object a mesh of its own,
+            # but leave a curve or text as it was.
+            data = thing.original if thing.type != "MESH" and thing.modifiers else thing.data
+            key = (data.as_pointer(), tuple(s.material.name_full if s.material else "" for s in thing.material_slots))
             if key not in self._geometries:
                 self._geometries[key] = self._read_geometry(thing)
             self._geometries[key].transforms.append(to_world)
         elif thing.type not in _IGNORED:
             self.report.warn(f'object "{thing.name}"', f"objects of the type {thing.type} are left out")
+
+    def _warn_of_render_settings(self, render: Any) -> None:
+        for name, what in (("use_motion_blur", "motion blur"), ("film_transparent", "a transparent film")):
+            if getattr(render, name):
+                self.report.warn("render settings", f"{what} has no effect")
+
+    def _warn_of_ray_visibility(self, thing: Any) -> None:
+        where = f'object "{thing.name}"'
+        if not all(getattr(thing, f"visible_{kind}") for kind in _RAYS):
+            self.report.warn(where, "ray visibility has no effect")
+        for name, what in (("is_holdout", "a holdout"), ("is_shadow_catcher", "a shadow catcher")):
+            if getattr(thing, name):
+                self.report.warn(where, f"is {what}, which has no effect")
+        links = thing.light_linking
+        if links.receiver_collection or links.blocker_collection:
+            self.report.warn(where, "light linking has no effect")
+        for system in thing.particle_systems:
+            if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
+                self.report.warn(where, f'the hair of "{system.name}" is left out')
 
     def _read_geometry(self, thing: Any) -> _Geometry:
         names = [self._material(slot.material) for slot in thing.material_slots] or [self._material(None)]

@@ -5,16 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
+from .albedos import microfacets, several_times
 from .nodes import Output
 from .values import Value, Values, is_black, is_texture, mixture, parameter, product
 
 SMOOTH = 0.01
 """Constant roughnesses below this one are mirrors or clear glass."""
-
-_ALBEDOS = (1.0, 1.0, 0.994, 0.976, 0.940, 0.879, 0.797, 0.697, 0.588, 0.478, 0.377)
-"""Of white microfacets (GGX) with single scattering, averaged over directions, for the roughnesses 0, 0.1, ... 1."""
 
 
 @dataclass
@@ -61,24 +57,37 @@ def rough(roughness: Value, node: Output, values: Values, anisotropy: float = 0.
     return {**parameters, "alpha_u": product(alpha, across), "alpha_v": product(alpha, 1 / across)}
 
 
+def scatters_again(roughness: Value, node: Output) -> bool:
+    """Whether light is scattered several times between the microfacets of a node."""
+    return getattr(node.node, "distribution", "") == "MULTI_GGX" and not is_texture(roughness) and roughness >= SMOOTH
+
+
 def glossy(bsdf: dict[str, Any], color: Value, roughness: Value, node: Output) -> Surface:
-    """Microfacets that reflect this colour, on both sides. The distribution Multiscatter GGX adds what is scattered
-    several times between them, as a diffuse part [Kulla & Conty 2017] of the right albedo on average over directions.
+    """Microfacets that reflect this colour on average, on both sides. The distribution Multiscatter GGX adds what is scattered
+    several times between them, as much as in Cycles [Turquin 2019] on average over directions, as a diffuse part.
     """
     single = reflecting(bsdf)
-    if node.node.distribution != "MULTI_GGX" or is_texture(roughness) or roughness < SMOOTH:
+    if not scatters_again(roughness, node):
         return Surface(single)
-    albedo = float(np.interp(roughness, np.linspace(0, 1, len(_ALBEDOS)), _ALBEDOS))
+    albedo = microfacets(roughness**2)[0]
     if is_texture(color):
-        color = product(color, color)
+        more = product(product(color, color), 1 - albedo)
     else:
-        color = tuple(c * c * albedo / (1 - c * (1 - albedo)) for c in color)
-    return Surface(weighted_sum([(1.0, single), (1 - albedo, diffuse(color).bsdf)]))
+        more = tuple(c * albedo * (several_times(c, roughness**2) - 1) for c in color)
+    return Surface(weighted_sum([(1.0, single), (1.0, diffuse(more).bsdf)]))
 
 
-def dielectric(ior: float, roughness: dict[str, Any]) -> dict[str, Any]:
-    """Glass, smooth or rough."""
-    return {"type": "roughdielectric" if roughness else "dielectric", **roughness, "int_ior": ior, "ext_ior": 1.0}
+def dielectric(ior: float, roughness: dict[str, Any], reflected: Value = 1.0, transmitted: Value = 1.0) -> dict[str, Any]:
+    """Glass, smooth or rough, with factors of what it reflects and transmits."""
+    return {"type": "roughdielectric" if roughness else "dielectric", **roughness, "int_ior": ior, "ext_ior": 1.0,
+            "specular_reflectance": parameter(reflected), "specular_transmittance": parameter(transmitted)}
+
+
+def glass_gain(ior: float, roughness: Value, node: Output) -> float:
+    """The factor of rough glass with which it loses no light on average, for the distribution Multiscatter GGX."""
+    if not scatters_again(roughness, node):
+        return 1.0
+    return 1 / sum(microfacets(roughness**2, max(ior, 1 / ior))[:2])
 
 
 def mixed(weight: Value, a: Surface, b: Surface) -> Surface:

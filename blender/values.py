@@ -16,9 +16,20 @@ Color = tuple[float, float, float]
 Value = float | Color | dict[str, Any]
 
 _WRAPS = {"REPEAT": "repeat", "EXTEND": "clamp", "CLIP": "zero", "MIRROR": "mirror"}
+
+
+def power(a: float, b: float) -> float:
+    """As the shaders of Blender: 0 where there is no real power. It is also 0 where theirs is infinite."""
+    try:
+        result = a**b
+    except (ZeroDivisionError, OverflowError):
+        return 0.0
+    return 0.0 if isinstance(result, complex) or abs(result) > np.finfo(np.float32).max else result
+
+
 _OPERATIONS = {
     "ADD": lambda a, b: a + b, "SUBTRACT": lambda a, b: a - b, "MULTIPLY": lambda a, b: a * b,
-    "DIVIDE": lambda a, b: a / b if b else 0.0, "POWER": lambda a, b: abs(a) ** b, "MINIMUM": min, "MAXIMUM": max,
+    "DIVIDE": lambda a, b: a / b if b else 0.0, "POWER": power, "MINIMUM": min, "MAXIMUM": max,
 }
 # Blender's (u, v) = (0, 0) is the lower left corner of an image, etendue's the upper left one.
 _FLIP_V = np.array([[1.0, 0, 0, 0], [0, -1, 0, 1], [0, 0, 1, 0], [0, 0, 0, 1]])
@@ -215,7 +226,7 @@ class Values:
         value, gamma = self.color(node.input("Color")), self.number(node.input("Gamma"))
         if is_texture(value) or is_texture(gamma):
             return None
-        return tuple(max(c, 0.0) ** gamma for c in value)
+        return tuple(power(c, gamma) if c > 0 or gamma == 0 else c for c in value)
 
     def _ShaderNodeMath(self, node: Output) -> Value | None:
         operation = node.node.operation

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 import threading
+import weakref
 from pathlib import Path
 from typing import Any
 
@@ -21,64 +22,85 @@ class Viewport:
     """One viewport of an engine. Blender's data are read on the main thread only; the other one renders."""
 
     def __init__(self, engine: Any):
-        self._engine = engine
+        # Blender releases the engine of a viewport without further notice.
+        self._engine = weakref.ref(engine)
+        weakref.finalize(engine, self.close)
         self._folder = tempfile.TemporaryDirectory(prefix="etendue-")
         self._description: dict[str, Any] | None = None
         self._view: tuple[float, ...] | None = None
-        self._image: np.ndarray | None = None
-        self._thread: threading.Thread | None = None
-        self._stop = threading.Event()
+        self._run: _Run | None = None
+        self._error = ""
 
     def update(self, context: Any, depsgraph: Any) -> None:
         """Reads the scene anew."""
         self._cancel()
+        self._description, self._view, self._error = None, None, ""
         try:
             self._description = SceneReader(depsgraph, Path(self._folder.name)).read(_sensor(context))
         except (Refused, RuntimeError, ValueError) as e:
-            self._description = None
-            self._engine.update_stats("etendue", str(e))
-        self._view = None
+            self._error = str(e)
 
     def draw(self, context: Any, depsgraph: Any) -> None:
         """Draws the newest image, and starts a rendering if the view has changed."""
-        view = _view(context)
+        engine, view, settings = self._engine(), _view(context), depsgraph.scene.etendue
         if self._description is not None and view != self._view:
             self._view = view
-            self._start(context, depsgraph.scene.etendue)
-        if self._image is not None:
-            _draw(self._engine, context, depsgraph.scene, self._image)
+            self._cancel()
+            description = {**self._description, "sensor": _sensor(context)}
+            self._run = _Run(self._engine, description, integrator_text(settings), settings.preview_samples)
+        error = self._error or (self._run.error if self._run else "")
+        engine.update_stats("etendue", error)
+        if self._run is not None and self._run.image is not None:
+            _draw(engine, context, depsgraph.scene, self._run.image)
 
-    def _start(self, context: Any, settings: Any) -> None:
+    def close(self) -> None:
+        """Ends the rendering."""
         self._cancel()
-        try:
-            import etendue as et
-        except ImportError as e:
-            self._engine.update_stats("etendue", str(e))
-            return
-        description = {**self._description, "sensor": _sensor(context)}
-        method, samples = integrator_text(settings), settings.preview_samples
-        self._stop = stop = threading.Event()
-
-        def show(progress: et.Progress) -> bool:
-            if not stop.is_set():
-                self._image = progress.image
-                self._engine.tag_redraw()
-            return not stop.is_set()
-
-        def render() -> None:
-            try:
-                et.render(et.load_dict(description).build(), method, spp=samples, callback=show, progress=False)
-            except (RuntimeError, ValueError) as e:
-                self._engine.update_stats("etendue", str(e))
-
-        self._thread = threading.Thread(target=render, daemon=True)
-        self._thread.start()
 
     def _cancel(self) -> None:
-        self._stop.set()
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
+        if self._run is not None:
+            self._run.stop()
+            self._run = None
+
+
+class _Run:
+    """A rendering on a thread of its own."""
+
+    def __init__(self, engine: Any, description: dict[str, Any], method: str, samples: int):
+        self.image: np.ndarray | None = None
+        self.error = ""
+        """Why there is no image."""
+        self._engine = engine
+        self._is_stopped = threading.Event()
+        self._thread = threading.Thread(target=self._render, args=(description, method, samples), daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Ends it, within a pass too."""
+        self._is_stopped.set()
+        self._thread.join()
+
+    def _render(self, description: dict[str, Any], method: str, samples: int) -> None:
+        def show(progress: Any) -> None:
+            self.image = progress.image
+            self._redraw()
+
+        try:
+            import etendue as et
+
+            with et.start(et.load_dict(description).build(), method, spp=samples, callback=show) as job:
+                while not job.done and not self._is_stopped.wait(0.02):
+                    pass
+            if not self._is_stopped.is_set():
+                job.result()
+        except Exception as e:
+            self.error = str(e) or type(e).__name__
+            self._redraw()
+
+    def _redraw(self) -> None:
+        engine = self._engine()
+        if engine is not None and not self._is_stopped.is_set():
+            engine.tag_redraw()
 
 
 def _view(context: Any) -> tuple[float, ...]:

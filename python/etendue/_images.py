@@ -22,7 +22,10 @@ def _pixels(image: Any) -> Image:
         return read_image(image)
     if hasattr(image, "image"):  # a Result
         image = image.image
-    pixels = np.ascontiguousarray(image, dtype=np.float32)
+    array = np.asarray(image)
+    if array.dtype.kind == "c":
+        raise ValueError("an image has real numbers, but this one is complex")
+    pixels = np.ascontiguousarray(_decoded(array) if array.dtype == np.uint8 else array, dtype=np.float32)
     if pixels.ndim == 2:
         pixels = np.repeat(pixels[:, :, None], 3, axis=2)
     if pixels.ndim != 3 or pixels.shape[2] != 3:
@@ -30,6 +33,14 @@ def _pixels(image: Any) -> Image:
     if pixels.size == 0:
         raise ValueError(f"the image has no pixels: its shape is {pixels.shape}")
     return pixels
+
+
+def _decoded(codes: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """sRGB codes as linear values."""
+    values = np.arange(256) / 255
+    linear = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+    decoded: NDArray[np.float64] = linear[codes]
+    return decoded
 
 
 def read_image(file: str | PathLike[str], layer: str = "") -> Image:
@@ -122,7 +133,7 @@ def diff(
     ignore_above: float = float("inf"),
 ) -> Diff:
     """Compares an image with a reference of the same shape (H, W, 3), as `etendue diff`. Images are arrays, files or
-    Results, in linear RGB.
+    Results, in linear RGB; arrays of uint8 are sRGB codes.
 
     reference2: a second, independent reference. Squared errors are then (X - R1)(X - R2), so that the noise of the
         references cancels on average.

@@ -27,7 +27,7 @@ def integrator(name: str, /, **parameters: bool | float | str | PathLike[str]) -
     """
     text = name
     for i, (parameter, value) in enumerate(parameters.items()):
-        text += f"{',' if i else ':'}{parameter}={_text(name, parameter, value)}"
+        text += f"{',' if i or ':' in name else ':'}{parameter}={_text(name, parameter, value)}"
     _etendue.check_integrator(text)
     return text
 

@@ -88,10 +88,11 @@ def _vectors(name: str, value: ArrayLike) -> Doubles:
 
 def _unit(value: ArrayLike) -> Doubles:
     d = _vectors("directions", value)
-    length = np.linalg.norm(d, axis=-1, keepdims=True)
-    if not length.all():
-        raise ValueError(f"directions{list(_first(length[..., 0] == 0)) or ''} is zero")
-    return np.asarray(d / length)
+    largest = np.abs(d).max(axis=-1, keepdims=True)
+    if not largest.all():
+        raise ValueError(f"directions{list(_first(largest[..., 0] == 0)) or ''} is zero")
+    d = d / largest  # so that squares are no denormal numbers
+    return np.asarray(d / np.linalg.norm(d, axis=-1, keepdims=True))
 
 
 def _rows(lead: tuple[int, ...], vectors: NDArray[Any]) -> Floats:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _etendue
+from ._arguments import count, whole
 from ._denoiser_library import denoiser_library
 from ._etendue import Scene
 from ._html import image_html, png_of
@@ -382,7 +383,7 @@ def render(
         result = et.render("scenes/cornell.xml", "bdpt", spp=64)
         result = et.render(scene, {"type": "path", "max_depth": 8}, time=10, aovs=["albedo"])
 
-    scene: a Scene, or a Description or file, which is built first.
+    scene: a Scene, or a Description, a dict as load_dict() takes it, or a file, which is built first.
     integrator: a name with parameters, such as "upg+bdpt:max_depth=12"; the same as a dict or by integrator(); "" for the
         integrator of the scene; or an Integrator.
     spp, time, error: limits: samples per pixel, seconds, relative error of the image (see Result.error). The first limit
@@ -395,7 +396,8 @@ def render(
     threads: number of threads; 0 for one per core.
     aovs: auxiliary images to render: albedo, normal, depth, position, uv, denoise_albedo, denoise_normal, variance.
     techniques: makes an image of each technique, for paths of at most this many edges; True: 6.
-    sensor: number (from 0) or name of the sensor, of files and Descriptions; None: the first. A Scene has one already.
+    sensor: number (from 0) or name of the sensor, of files, dicts and Descriptions; None: the first. A Scene has one
+        already.
     callback: called between passes with a Progress. If it returns False, the rendering ends. Exceptions that it raises
         are passed to the caller.
     progress: shows a progress bar of tqdm; None: in notebooks and on terminals, if tqdm is installed.
@@ -433,6 +435,9 @@ def new_rendering(
 ) -> _etendue.Rendering:
     """A rendering before its first pass, with the arguments of render()."""
     _etendue.check_aovs(list(aovs))
+    spp, seed = count("spp", spp), count("seed", seed) or 0
+    if sensor is not None and not isinstance(sensor, str):
+        sensor = whole("sensor", sensor)
     depth = 6 if techniques is True else int(techniques)
     first = 0
     if passes is not None:

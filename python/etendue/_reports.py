@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _etendue
+from ._arguments import count
 from ._etendue import Description, Scene
 from ._html import auto_exposure, frame_of, image_html, table_html
 from ._integrator import Integrator
@@ -252,7 +253,7 @@ def compare(
         report.frame()
         report.plot()
 
-    scenes: one or several files, Descriptions or Scenes. methods: names with parameters, dicts, or Integrators.
+    scenes: one or several files, dicts, Descriptions or Scenes. methods: names with parameters, dicts, or Integrators.
     runs, seed: number of independent runs, which have consecutive seeds, and the first seed.
     sampler: "sobol" or "independent". threads: number of threads; 0 for one per core.
     paths: "all", or "inner" for those that join two sub-paths inside the scene (s >= 1 and t >= 2).
@@ -265,8 +266,9 @@ def compare(
     Ctrl-C ends the comparison; the report contains the results so far. If a scene or a method fails, a RuntimeWarning says
     so, and the report contains the others; if all fail, RuntimeError is raised.
     """
-    wanted = [scenes] if isinstance(scenes, (Scene, Description, str, PathLike)) else list(scenes)
+    wanted = [scenes] if isinstance(scenes, (Scene, Description, dict, str, PathLike)) else list(scenes)
     images = [reference] if isinstance(reference, (str, PathLike)) else list(reference or ())
+    spp, seed, reference_spp = count("spp", spp), count("seed", seed) or 0, count("reference_spp", reference_spp)
     listener, end = _status(progress)
     try:
         comparisons, text = _etendue.compare(
@@ -325,6 +327,7 @@ def verify(
     True; if there are none, KeyboardInterrupt is raised. Methods that fail are left out with a RuntimeWarning; if all fail,
     RuntimeError is raised.
     """
+    spp, seed = count("spp", spp), count("seed", seed) or 0
     listener, end = _status(progress)
     try:
         text = _etendue.verify(

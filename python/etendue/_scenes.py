@@ -1,7 +1,7 @@
 """Scenes: loading, transforms, plug-ins."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike, fspath
 from typing import Any
 
@@ -12,8 +12,8 @@ from . import _etendue
 from ._etendue import Description, Scene
 
 Vector = tuple[float, float, float]
-SceneLike = Scene | Description | str | PathLike[str]
-"""A scene, or what one can be built from: a description or a file."""
+SceneLike = Scene | Description | dict[str, Any] | str | PathLike[str]
+"""A scene, or what one can be built from: a description, a dict as load_dict() takes it, or a file."""
 
 
 def load(
@@ -51,7 +51,9 @@ def load_string(
     return _etendue.load_string(xml, {key: str(value) for key, value in defines.items()}, name, lenient)
 
 
-def load_dict(d: dict[str, Any], *, folder: str | PathLike[str] = ".") -> Description:
+def load_dict(
+    d: dict[str, Any], *, folder: str | PathLike[str] = ".", file: str | PathLike[str] = "dict", warnings: Sequence[str] = ()
+) -> Description:
     """Reads a scene from nested dicts in the format of mi.load_dict() of Mitsuba 3.
 
     Every object is a dict with a "type", the name of a plug-in; {"type": "ref", "id": ...} refers to another object. Values
@@ -73,22 +75,26 @@ def load_dict(d: dict[str, Any], *, folder: str | PathLike[str] = ".") -> Descri
     "raw": True), floats are linear. The names of Mitsuba ("vertex_positions", ...) are known, too.
 
     folder: folder in which the files of the scene are searched.
+    file: the name of the scene in messages and reports, Description.file.
+    warnings: Description.warnings, for readers of other formats.
 
     Raises SceneError, with the keys that lead to the place, if the dicts are not valid.
     """
-    return _etendue.load_dict(d, fspath(folder))
+    return _etendue.load_dict(d, fspath(folder), fspath(file), list(warnings))
 
 
 def built(scene: SceneLike, threads: int = 0, sensor: int | str | None = None) -> Scene:
     """The scene itself, or that of a description or file."""
     if isinstance(scene, Scene):
         if sensor is not None:
-            raise ValueError("sensor is for files and Descriptions: a Scene has its sensor from Description.build(sensor=...)")
+            raise ValueError("sensor is for files, dicts and Descriptions: a Scene has its sensor from Description.build(sensor=...)")
         return scene
     if isinstance(scene, (str, PathLike)):
         scene = load(scene)
+    if isinstance(scene, dict):
+        scene = load_dict(scene)
     if not isinstance(scene, Description):
-        raise TypeError(f"a scene is a Scene, a Description or the name of a file, but found {type(scene).__name__}")
+        raise TypeError(f"a scene is a Scene, a Description, a dict or the name of a file, but found {type(scene).__name__}")
     return scene.build(threads=threads, sensor=sensor)
 
 

@@ -68,6 +68,8 @@ const char* name_of(Strategy strategy);
 
 /// An integrator by name and parameters, as a text or a dict, or an object that etendue.Integrator is the base of.
 IntegratorSpec to_spec(const Scene& scene, nb::handle integrator);
+/// The object of an integrator in Python, to which all copies of what to_spec() returned refer; nullptr if it is none.
+nb::object* python_integrator(const IntegratorSpec& spec);
 
 /// Runs tasks on a thread of their own, without the GIL, while the calling thread handles signals and callbacks.
 class Background {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <map>
 #include <set>
 
@@ -19,6 +20,7 @@
 #include "bindings.h"
 #include "embedded.h"
 #include "readers/mitsuba_values.h"
+#include "readers/mitsuba_writer.h"
 #include "readers/mitsuba_xml.h"
 #include "readers/nesting.h"
 #include "readers/object_graph.h"
@@ -26,6 +28,8 @@
 #include "render/plugin_list.h"
 #include "render/scene_integrator.h"
 #include "scene/builder.h"
+#include "scene/plain_mitsuba.h"
+#include "system/output_file.h"
 #include "values.h"
 
 namespace etendue::python {
@@ -51,12 +55,14 @@ bool is_automatic(std::string_view key, std::string_view category) {
 /// Reads dicts as mi.load_dict() takes them.
 class DictReader {
 public:
-    explicit DictReader(SceneDescription& scene) : scene_(scene) {}
+    /// `origin` names the dicts in messages.
+    explicit DictReader(SceneDescription& scene, std::string origin = "dict")
+        : scene_(scene), origin_(std::move(origin)) {}
 
     void read_scene(nb::dict d) {
         if (d.contains("type") &&
             !(nb::isinstance<nb::str>(d["type"]) && text(d["type"]) == "scene"))
-            throw SceneError({"dict", 0}, "the outermost \"type\" must be \"scene\"");
+            throw SceneError({origin_, 0}, "the outermost \"type\" must be \"scene\"");
         for (const auto& [key, value] : d) {
             const std::string name = key_of(key, "");
             if (name == "type") continue;
@@ -66,10 +72,17 @@ public:
         }
         finish();
     }
-    /// Adds the object under `name` to `parent`, -1 for the scene itself.
-    void add(int parent, const std::string& name, nb::handle value, bool in_emitter) {
-        for (size_t i = 0; i < scene_.objects.size(); ++i)
-            if (const std::string& id = scene_.objects[i].id; !id.empty()) ids_[id] = int(i);
+    /// Adds the object under `name` to `parent`, -1 for the scene itself. It may declare the ids of what only the child
+    /// `replaced` of the parent has.
+    void add(int parent, const std::string& name, nb::handle value, bool in_emitter,
+             std::optional<size_t> replaced) {
+        const std::vector<bool> is_reached = reached();
+        stays_ = replaced ? reached(parent, *replaced) : is_reached;
+        for (size_t i = 0; i < is_reached.size(); ++i) {
+            std::string& id = scene_.objects[i].id;
+            if (!is_reached[i]) id.clear();  // of what an edit has removed
+            if (!id.empty()) ids_[id] = int(i);
+        }
         read_child(parent, name, value, name, in_emitter, 0);
         finish();
     }
@@ -82,8 +95,28 @@ private:
         SourceLocation where;
     };
 
-    static SourceLocation at(const std::string& path) { return {"dict: " + path, 0}; }
-    static std::string key_of(nb::handle key, const std::string& path) {
+    /// The objects that can be reached from the roots, but not by the given one of the children of a parent.
+    std::vector<bool> reached(int without_parent = -2, size_t without_slot = 0) const {
+        std::vector<bool> is_reached(scene_.objects.size());
+        std::vector<int> next;
+        const auto add_all = [&](int parent, const auto& children, const auto& object_of) {
+            for (size_t i = 0; i < children.size(); ++i)
+                if (parent != without_parent || i != without_slot)
+                    next.push_back(object_of(children[i]));
+        };
+        add_all(-1, scene_.roots, [](int object) { return object; });
+        while (!next.empty()) {
+            const int index = next.back();
+            next.pop_back();
+            if (is_reached[size_t(index)]) continue;
+            is_reached[size_t(index)] = true;
+            add_all(index, scene_.objects[size_t(index)].children,
+                    [](const SceneObject::Child& c) { return c.object; });
+        }
+        return is_reached;
+    }
+    SourceLocation at(const std::string& path) const { return {origin_ + ": " + path, 0}; }
+    std::string key_of(nb::handle key, const std::string& path) const {
         if (!nb::isinstance<nb::str>(key))
             throw SceneError(at(path),
                              fmt::format("the key {} is not a text", text(nb::repr(key))));
@@ -187,13 +220,20 @@ private:
             scene_.objects[size_t(parent)].children.push_back({name, object, at(path)});
     }
     void declare(const std::string& id, int index, const std::string& path) {
-        if (!ids_.emplace(id, index).second)
-            throw SceneError(at(path), fmt::format("the id {} is taken", quote(id)));
+        if (const auto [known, is_new] = ids_.emplace(id, index); !is_new) {
+            const auto other = size_t(known->second);
+            if (other >= stays_.size() || stays_[other])
+                throw SceneError(at(path), fmt::format("the id {} is taken", quote(id)));
+            scene_.objects[other].id.clear();
+            known->second = index;
+        }
         scene_.objects[size_t(index)].id = id;
     }
 
     SceneDescription& scene_;
+    std::string origin_;
     std::map<std::string, int> ids_;
+    std::vector<bool> stays_;  ///< Whether an object of before keeps its id.
     std::vector<Reference> references_;
 };
 
@@ -408,7 +448,8 @@ void set_in(SceneDescription& scene, const std::string& path, nb::handle value) 
             std::erase_if(scene.objects[size_t(parent)].params,
                           [&](const Param& p) { return p.name == key; });
         if (replaces && parent < 0) scene.objects[size_t(at.object)].id.clear();
-        DictReader(scene).add(parent, key, value, at.in_emitter);
+        DictReader(scene).add(parent, key, value, at.in_emitter,
+                              replaces ? std::optional(at.slot) : std::nullopt);
         if (!replaces) return;
         // The new one is the last.
         if (parent < 0) {
@@ -494,8 +535,8 @@ struct SensorText {
     }
 };
 
-ScenePtr build(const SceneDescription& description,
-               const std::optional<std::pair<int, int>>& resolution,
+/// `description` is a copy: other threads may edit the original while the scene is built.
+ScenePtr build(SceneDescription description, const std::optional<std::pair<int, int>>& resolution,
                const std::optional<std::array<int, 4>>& crop, bool lenient, bool watertight,
                int threads, const std::optional<std::variant<int, std::string>>& sensor) {
     BuildOptions options;
@@ -513,7 +554,7 @@ ScenePtr build(const SceneDescription& description,
     use_threads();
     nb::gil_scoped_release no_gil;
     Scene scene = build_scene(description, options);
-    auto handle = std::make_shared<SceneHandle>(description, std::move(scene));
+    auto handle = std::make_shared<SceneHandle>(std::move(description), std::move(scene));
     handle->lenient = lenient;
     handle->watertight = watertight;
     return handle;
@@ -553,6 +594,23 @@ nb::list matrix(const std::optional<Transform>& t) {
         throw nb::value_error("origin and target must differ, and up must not point along the "
                               "viewing direction");
     return nb::cast<nb::list>(to_python(*t));
+}
+
+/// Writes the description as XML, with the meshes and images that it holds beside it. Returns what differs in Mitsuba.
+std::vector<std::string> save(SceneDescription scene, const std::string& file, bool is_plain) {
+    const std::filesystem::path path(file);
+    if (path.extension() != ".xml")
+        throw nb::value_error(
+            fmt::format("a description is saved as .xml, not as {}", quote(file)).c_str());
+    const nb::gil_scoped_release no_gil;
+    std::vector<std::string> notes;
+    if (is_plain) notes = make_plain_mitsuba(scene);
+    const std::string xml =
+        write_mitsuba_xml(scene, file, path.stem().string() + "_files", [&](const SceneFile& part) {
+            write_file((path.parent_path() / part.name).string(), part.bytes);
+        });
+    write_file(file, xml);
+    return notes;
 }
 
 /// A view of a mapping, such as that of dict.items().
@@ -635,12 +693,29 @@ void bind_description(nb::module_& m) {
             "Canonical text: one line for each object and parameter. Equal for equal scenes, "
             "whatever "
             "they were read from.")
+        .def(
+            "save",
+            [](const SceneDescription& d, nb::handle file, bool mitsuba) {
+                const auto name =
+                    nb::cast<std::string>(nb::module_::import_("os").attr("fspath")(file));
+                for (const std::string& note : save(d, name, mitsuba))
+                    if (PyErr_WarnEx(PyExc_UserWarning, note.c_str(), 1) != 0)
+                        throw nb::python_error();
+            },
+            "file"_a, "mitsuba"_a = false,
+            nb::sig("def save(self, file: str | os.PathLike[str], mitsuba: bool = False) -> None"),
+            "Writes an .xml file of Mitsuba, which `etendue render` and load() read, and meshes "
+            "and images to the folder NAME_files beside it.\n\n"
+            "mitsuba: replaces plug-ins and parameters that Mitsuba 3 does not have, like `etendue "
+            "convert`; a UserWarning names each replacement that changes the image.\n\n"
+            "Raises ValueError for another extension, and RuntimeError if a file cannot be "
+            "written.")
         .def_prop_ro(
             "file", [](const SceneDescription& d) { return d.file; },
-            "The file that it was read from; \"dict\" for dicts.")
+            "The file that it was read from; \"dict\" for dicts without one.")
         .def_prop_ro(
             "warnings", [](const SceneDescription& d) { return d.warnings; },
-            "What was left out under lenient=True, one sentence each.")
+            "What was left out or replaced by the reader, one sentence each.")
         .def(
             "build", &build, "resolution"_a.none() = nb::none(), "crop"_a.none() = nb::none(),
             "lenient"_a = false, "watertight"_a = false, "threads"_a = 0,
@@ -762,14 +837,16 @@ void bind_description(nb::module_& m) {
         "xml"_a, "defines"_a, "name"_a, "lenient"_a);
     m.def(
         "load_dict",
-        [](nb::dict d, const std::string& folder) {
+        [](nb::dict d, const std::string& folder, const std::string& file,
+           std::vector<std::string> warnings) {
             SceneDescription scene;
-            scene.file = "dict";
+            scene.file = file;
             scene.search_paths = {folder};
-            DictReader(scene).read_scene(d);
+            scene.warnings = std::move(warnings);
+            DictReader(scene, file).read_scene(d);
             return scene;
         },
-        "d"_a, "folder"_a);
+        "d"_a, "folder"_a, "file"_a = "dict", "warnings"_a = nb::list());
     m.def(
         "plugins",
         [](const std::string& category, const std::string& name) {

@@ -171,18 +171,28 @@ private:
     TechniqueCounts counts_;
 };
 
-IntegratorSpec python_spec(nb::handle integrator) {
-    IntegratorSpec spec;
-    spec.name = nb::cast<std::string>(integrator.attr("name"));
-    const auto object = shared(nb::borrow(integrator));
-    spec.make = [object](const std::map<std::string, std::string>& params) {
+struct PythonMaker {
+    std::shared_ptr<nb::object> object;
+
+    std::unique_ptr<Integrator> operator()(const std::map<std::string, std::string>& params) const {
         const auto depth = params.find("max_depth");
         const int max_depth = depth == params.end() ? kNoRoulette : std::stoi(depth->second);
         return std::make_unique<PythonIntegrator>(object, max_depth > 0 ? max_depth : kNoRoulette);
-    };
+    }
+};
+
+IntegratorSpec python_spec(nb::handle integrator) {
+    IntegratorSpec spec;
+    spec.name = nb::cast<std::string>(integrator.attr("name"));
+    spec.make = PythonMaker{shared(nb::borrow(integrator))};
     return spec;
 }
 }  // namespace
+
+nb::object* python_integrator(const IntegratorSpec& spec) {
+    const auto* maker = spec.make.target<PythonMaker>();
+    return maker ? maker->object.get() : nullptr;
+}
 
 IntegratorSpec to_spec(const Scene& scene, nb::handle integrator) {
     if (nb::isinstance<nb::str>(integrator))

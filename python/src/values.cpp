@@ -29,13 +29,32 @@ bool is_text(nb::handle value) {
     return nb::isinstance<nb::str>(value);
 }
 
+/// Arrays without a dimension say that they are sequences, but have no length.
+bool is_sequence(nb::handle value) {
+    if (!PySequence_Check(value.ptr())) return false;
+    if (PySequence_Size(value.ptr()) >= 0) return true;
+    PyErr_Clear();
+    return false;
+}
+
+/// Whether the value is a boolean of NumPy, or an array of one without a dimension.
+bool is_numpy_bool(nb::handle value) {
+    if (is_sequence(value) || !nb::hasattr(value, "dtype")) return false;
+    const nb::object kind = nb::getattr(value.attr("dtype"), "kind", nb::none());
+    return is_text(kind) && nb::cast<std::string>(kind) == "b";
+}
+
 /// Python's and NumPy's integers.
 bool is_integer(nb::handle value) {
-    return PyIndex_Check(value.ptr()) && !PySequence_Check(value.ptr());
+    if (!PyIndex_Check(value.ptr()) || is_sequence(value)) return false;
+    if (const nb::object index = nb::steal(PyNumber_Index(value.ptr())); index.is_valid())
+        return true;
+    PyErr_Clear();
+    return false;
 }
 
 std::optional<double> number(nb::handle value) {
-    if (is_text(value) || PySequence_Check(value.ptr())) return {};
+    if (is_text(value) || is_sequence(value)) return {};
     const double v = PyFloat_AsDouble(value.ptr());
     if (v == -1 && PyErr_Occurred()) {
         PyErr_Clear();
@@ -45,18 +64,19 @@ std::optional<double> number(nb::handle value) {
 }
 
 /// The numbers of a sequence or array, row by row where it has rows; empty for anything else.
-std::vector<double> numbers(nb::handle value, size_t& rows) {
+std::vector<double> numbers(nb::handle value, size_t& rows, bool is_row = false) {
     std::vector<double> all;
     rows = 0;
-    if (is_text(value) || !PySequence_Check(value.ptr())) return {};
+    if (is_text(value) || !is_sequence(value)) return {};
     for (nb::handle item : nb::borrow<nb::sequence>(value)) {
         if (const auto v = number(item)) {
             all.push_back(*v);
             continue;
         }
+        if (is_row) return {};
         size_t inner = 0;
-        const std::vector<double> row = numbers(item, inner);
-        if (row.empty() || inner > 0) return {};
+        const std::vector<double> row = numbers(item, inner, true);
+        if (row.empty()) return {};
         all.insert(all.end(), row.begin(), row.end());
         ++rows;
     }
@@ -173,6 +193,7 @@ ParamValue to_value(nb::handle value, const ValueContext& c) {
         is_colour || c.kind == ParamKind::Float || c.kind == ParamKind::FloatOrName;
     if (nb::isinstance<nb::dict>(value)) return value_of_dict(nb::borrow<nb::dict>(value), c);
     if (nb::isinstance<nb::bool_>(value)) return nb::cast<bool>(value);
+    if (is_numpy_bool(value)) return nb::cast<bool>(nb::bool_(value));
     if (is_text(value)) {
         if (is_colour) return parse_srgb(text(value), c.where);
         return text(value);

@@ -27,6 +27,16 @@ std::string escape(std::string_view text) {
     return out;
 }
 
+/// Of the file of an image, by its first bytes. Other programs choose the format by it.
+const char* extension_of(std::string_view bytes) {
+    if (bytes.starts_with("\xff\xd8")) return "jpg";
+    if (bytes.starts_with("PF") || bytes.starts_with("Pf")) return "pfm";
+    if (bytes.starts_with("\x76\x2f\x31\x01")) return "exr";
+    if (bytes.starts_with("#?")) return "hdr";
+    if (bytes.starts_with("BM")) return "bmp";
+    return "png";
+}
+
 bool is_grey(Rgb c) {
     return c.r == c.g && c.g == c.b;
 }
@@ -227,10 +237,8 @@ private:
         const auto count = int64_t(scene_.images.size());
         const auto index = size_t(Params(scene_, object).integer("image", 0, 0, count - 1));
         const std::string& bytes = scene_.images[index]->bytes;
-        const char* extension = bytes.starts_with("\xff\xd8") ? "jpg"
-                                : bytes.starts_with("PF\n")   ? "pfm"
-                                                              : "png";
-        const std::string name = fmt::format("{}/image{}.{}", files_folder_, index, extension);
+        const std::string name =
+            fmt::format("{}/image{}.{}", files_folder_, index, extension_of(bytes));
         if (written_images_.insert(index).second) add_file_({name, bytes});
         remove(o, "image");
         o.params.push_back({"filename", name, o.where});

@@ -53,7 +53,7 @@ std::vector<ParamInfo> mesh_params(const char* flip) {
 
 /// Converts the data of a mesh file to a mesh in world space.
 std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& warn) {
-    const std::string name = params.text("filename", data.name);
+    const std::string name = params.text("filename", data.name.empty() ? "mesh" : data.name);
     for (const std::string& note : data.notes) warn(fmt::format("{}: {}", name, note));
     const Transform t = params.transform("to_world");
     const bool compute_normals = params.flag("compute_normals", true);
@@ -88,6 +88,12 @@ std::unique_ptr<Shape> finish(MeshData data, const Params& params, const Warn& w
     if (const size_t dropped = given - mesh->faces().size())
         warn(fmt::format("{}: {} triangle{} of zero area left out", name, dropped,
                          dropped == 1 ? "" : "s"));
+    if (!flat && data.replaced_normals > 0)
+        warn(
+            fmt::format("{}: {} normal{} that {} zero or not finite {} computed from the triangles",
+                        name, data.replaced_normals, data.replaced_normals == 1 ? "" : "s",
+                        data.replaced_normals == 1 ? "was" : "were",
+                        data.replaced_normals == 1 ? "is" : "are"));
     return mesh;
 }
 

@@ -3,6 +3,8 @@
 import os
 import subprocess
 import sys
+import time
+import weakref
 import zipfile
 from pathlib import Path
 
@@ -78,13 +80,47 @@ def test_renderings_can_be_cancelled(studio, monkeypatch):
     assert len(calls) == 3
 
 
+def test_cancelling_does_not_wait_for_the_end_of_a_pass(studio, monkeypatch):
+    furnished(studio)
+    jobs = []
+    monkeypatch.setattr(et, "start", lambda *args, start=et.start, **kwargs: jobs.append(start(*args, **kwargs)) or jobs[0])
+    monkeypatch.setattr(sys.modules["etendue_addon"].EtendueEngine, "is_cancelled", lambda self: True)
+    studio.scene.render.resolution_x, studio.scene.render.resolution_y = 1200, 900
+    assert not studio.render().any()
+    assert jobs[0].done and jobs[0].progress.passes == 0
+
+
+def test_a_pass_that_fails_leaves_those_before_it(studio, monkeypatch, capfd):
+    furnished(studio)
+    whole = studio.render()
+
+    class Failing(et.Job):
+        def result(self, timeout=None):
+            raise et.RenderError("pass 3: not enough memory", super().result(timeout)) from MemoryError("no memory")
+
+    module = sys.modules[et.start.__module__]
+    monkeypatch.setattr(module, "Job", Failing)
+    studio.scene.etendue.samples = 2
+    broken = studio.render()
+    assert "etendue: no memory; the image is that of 2 samples" in "".join(capfd.readouterr())
+    assert broken.mean() == pytest.approx(whole.mean(), rel=0.2)
+
+
+def test_unexpected_errors_end_the_rendering_with_a_message(studio, monkeypatch):
+    furnished(studio)
+    monkeypatch.setattr(sys.modules["etendue_addon.scene"], "read_camera", lambda *_: 1 / 0)
+    with pytest.raises(RuntimeError, match="etendue: division by zero"):
+        studio.render()
+
+
 def test_the_time_ends_the_rendering(studio, monkeypatch):
     furnished(studio)
     seen = []
-    monkeypatch.setattr(et, "render", lambda *args, render=et.render, **kwargs: seen.append(render(*args, **kwargs)) or seen[0])
+    monkeypatch.setattr(et, "start", lambda *args, start=et.start, **kwargs: seen.append(start(*args, **kwargs)) or seen[0])
     studio.scene.etendue.samples, studio.scene.etendue.time = 100000, 1
     studio.render()
-    assert seen[0].stopped_by == "time" and seen[0].seconds < 5
+    result = seen[0].result()
+    assert result.stopped_by == "time" and result.seconds < 5
 
 
 def test_integrators_and_their_parameters_come_from_the_tables():
@@ -150,6 +186,85 @@ def test_viewports_render_what_the_camera_sees(studio):
     description = SceneReader(bpy.context.evaluated_depsgraph_get(), studio.folder).read(_sensor(Context))
     image = et.render(et.load_dict(description).build(), "path", spp=16, progress=False).image
     assert image.mean() == pytest.approx(studio.render().mean(), rel=0.02)
+
+
+class FakeEngine:
+    """What a viewport calls of Blender's engine."""
+
+    def __init__(self):
+        self.redraws, self.said = 0, ""
+
+    def tag_redraw(self):
+        self.redraws += 1
+
+    def update_stats(self, _, text):
+        self.said = text
+
+
+def viewport(studio, monkeypatch, engine):
+    """A viewport of the camera's view, and its context."""
+    module = sys.modules["etendue_addon.viewport"]
+    monkeypatch.setattr(module, "_draw", lambda *_: None)
+
+    class View:
+        is_perspective = True
+        view_matrix = studio.cam.matrix_world.inverted()
+        window_matrix = studio.cam.calc_matrix_camera(bpy.context.evaluated_depsgraph_get(), x=64, y=48)
+        perspective_matrix = window_matrix @ view_matrix
+
+    class Context:
+        region, region_data = type("Region", (), {"width": 64, "height": 48}), View
+
+    return module.Viewport(engine), Context
+
+
+def wait(condition):
+    for _ in range(1000):
+        if condition():
+            return
+        time.sleep(0.02)
+    raise AssertionError("it has not come")
+
+
+def test_viewports_render_until_blender_releases_them(studio, monkeypatch):
+    furnished(studio)
+    studio.scene.etendue.preview_samples = 1000000
+    engine = FakeEngine()
+    view, context = viewport(studio, monkeypatch, engine)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    view.update(context, depsgraph)
+    view.draw(context, depsgraph)
+    wait(lambda: view._run.image is not None)
+    view.draw(context, depsgraph)
+    assert engine.redraws > 0 and view._run.image.shape == (48, 64, 3)
+    run = view._run
+    released = weakref.ref(engine)
+    del engine
+    assert released() is None and not run._thread.is_alive() and not run.error
+
+
+def test_the_engines_of_blender_can_be_referred_to_weakly(studio, monkeypatch):
+    """By this, viewports know when they end."""
+    furnished(studio)
+    ended = []
+    engine = sys.modules["etendue_addon"].EtendueEngine
+    monkeypatch.setattr(engine, "_trace", lambda self, *_: weakref.finalize(self, ended.append, True) and None)
+    studio.scene.render.engine = "ETENDUE"
+    bpy.ops.render.render()
+    assert ended == [True]
+
+
+def test_viewports_say_why_there_is_no_image(studio, monkeypatch):
+    furnished(studio)
+    engine = FakeEngine()
+    view, context = viewport(studio, monkeypatch, engine)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    view.update(context, depsgraph)
+    monkeypatch.setattr(et, "load_dict", lambda *_: 1 / 0)
+    view.draw(context, depsgraph)
+    wait(lambda: view._run.error)
+    view.draw(context, depsgraph)
+    assert engine.said == "division by zero"
 
 
 _INSTALL = """

@@ -55,6 +55,13 @@ def test_emitting_meshes(studio):
     assert studio.ratio() == pytest.approx(1, abs=0.02)
 
 
+def test_portals_emit_nothing(studio):
+    studio.plane(material=gray(studio))
+    studio.world((0.2, 0.5, 1), 1.5)
+    studio.light("AREA", energy=1000, size=1).cycles.is_portal = True
+    assert studio.ratio() == pytest.approx(1, abs=0.02)
+
+
 def test_constant_worlds(studio):
     studio.plane(material=gray(studio))
     studio.world((0.2, 0.5, 1), 1.5)
@@ -101,9 +108,16 @@ def test_environment_images_are_turned_as_in_cycles(studio, angles):
 def test_what_lights_ignore_is_a_warning(studio, capfd):
     studio.plane(material=gray(studio))
     studio.light("AREA", energy=100, size=1, spread=1.0)
-    studio.light("SPOT", energy=100, shadow_soft_size=0.5, name="Torch")
+    studio.light("SPOT", energy=100, shadow_soft_size=0.5, name="Torch").use_shadow = False
+    studio.scene.objects["Plane"].visible_glossy = studio.scene.objects["Plane"].visible_shadow = False
+    studio.scene.objects["Plane"].is_shadow_catcher = True
+    studio.scene.render.use_motion_blur = studio.scene.render.film_transparent = True
     studio.render()
     said = capfd.readouterr()
     said = said.out + said.err
     assert 'light "Light": the spread has no effect' in said
     assert 'light "Torch": the spot light is a point' in said
+    assert 'light "Torch": a light without shadows casts shadows' in said
+    assert 'object "Plane": ray visibility has no effect' in said
+    assert 'object "Plane": is a shadow catcher, which has no effect' in said
+    assert "render settings: motion blur has no effect" in said and "a transparent film has no effect" in said

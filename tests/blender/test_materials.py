@@ -14,12 +14,16 @@ NODES = {
     "glossy Beckmann": ("ShaderNodeBsdfAnisotropic", dict(Color=COLOR, Roughness=0.5), "BECKMANN", "sun", 1),
     "glossy anisotropic": ("ShaderNodeBsdfAnisotropic", dict(Color=COLOR, Roughness=0.5, Anisotropy=0.5), "GGX", "world", 1),
     "mirror": ("ShaderNodeBsdfAnisotropic", dict(Color=COLOR, Roughness=0.0), "GGX", "world", 1),
-    "metal F82": ("ShaderNodeBsdfMetallic", dict(Roughness=0.3), "GGX", "world", 1.026),
-    "refraction": ("ShaderNodeBsdfRefraction", dict(Color=(0.8, 0.8, 0.8), Roughness=0.0), "GGX", "world", 0.895),
-    "rough diffuse": ("ShaderNodeBsdfDiffuse", dict(Color=COLOR, Roughness=0.5), None, "sun", 0.91),
-    "principled coat": (PRINCIPLED, dict(Base_Color=COLOR, Coat_Weight=1.0), "GGX", "world", 0.98),
+    "metal F82": ("ShaderNodeBsdfMetallic", dict(Roughness=0.3), "GGX", "world", 1),
+    "metal F82, dark edge": ("ShaderNodeBsdfMetallic", dict(Base_Color=COLOR, Edge_Tint=(0.4, 0.6, 0.8), Roughness=0.1), "GGX", "world", 1.02),
+    "refraction": ("ShaderNodeBsdfRefraction", dict(Color=(0.8, 0.8, 0.8), Roughness=0.0), "GGX", "world", 1),
+    "rough refraction": ("ShaderNodeBsdfRefraction", dict(Color=(0.8, 0.8, 0.8), Roughness=0.4), "GGX", "world", 1),
+    "rough diffuse": ("ShaderNodeBsdfDiffuse", dict(Color=COLOR, Roughness=0.5), None, "sun", 1),
+    "rougher diffuse": ("ShaderNodeBsdfDiffuse", dict(Color=COLOR, Roughness=1.0), None, "world", 1),
+    "principled coat": (PRINCIPLED, dict(Base_Color=COLOR, Coat_Weight=1.0), "GGX", "world", 1),
     "glass": ("ShaderNodeBsdfGlass", dict(Color=COLOR, Roughness=0.0), "GGX", "world", 1),
     "rough glass": ("ShaderNodeBsdfGlass", dict(Color=COLOR, Roughness=0.4), "GGX", "world", 1),
+    "rough glass, multiscatter": ("ShaderNodeBsdfGlass", dict(Color=COLOR, Roughness=0.4), "MULTI_GGX", "world", 1),
     "transparent": ("ShaderNodeBsdfTransparent", dict(Color=COLOR), None, "world", 1),
     "grey transparent": ("ShaderNodeBsdfTransparent", dict(Color=(0.5, 0.5, 0.5)), None, "world", 1),
     "translucent": ("ShaderNodeBsdfTranslucent", dict(Color=COLOR), None, "back", 1),
@@ -27,7 +31,12 @@ NODES = {
     "principled": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5), "GGX", "world", 1),
     "principled metal": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.3, Metallic=1.0), "GGX", "sun", 1),
     "principled metal, multiscatter": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5, Metallic=1.0), "MULTI_GGX", "world", 1),
-    "principled, multiscatter": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5), "MULTI_GGX", "world", 0.98),
+    "principled, sun": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5), "GGX", "sun", 1),
+    "principled, multiscatter": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5), "MULTI_GGX", "world", 1),
+    "principled, rough": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=1.0), "MULTI_GGX", "world", 1),
+    "principled, black": (PRINCIPLED, dict(Base_Color=(0.0, 0.0, 0.0), Roughness=0.7), "MULTI_GGX", "world", 1),
+    "principled rough glass": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.4, Transmission_Weight=1.0), "MULTI_GGX", "world", 0.97),
+    "principled rough metal": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=1.0, Metallic=1.0), "MULTI_GGX", "world", 1),
     "principled glass": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.0, Transmission_Weight=1.0), "GGX", "world", 1),
     "principled alpha": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5, Alpha=0.5), "GGX", "world", 1),
     "principled emission": (PRINCIPLED, dict(Emission_Color=COLOR, Emission_Strength=2.0), "GGX", None, 1),
@@ -110,6 +119,34 @@ def test_names_that_differ_only_in_special_characters(studio):
     image = studio.render()
     left, right = image[20:28, 20:26].mean(axis=(0, 1)), image[20:28, 38:44].mean(axis=(0, 1))
     assert left[0] > 5 * left[2] and right[2] > 5 * right[0]
+
+
+POWERS = [("POWER", 0.0, -1.0), ("POWER", -0.5, 2.0), ("POWER", -0.5, 0.5), ("POWER", 1e30, 9.0), ("DIVIDE", 1.0, 0.0)]
+
+
+@pytest.mark.parametrize("operation, a, b", POWERS)
+def test_operations_without_a_result_are_those_of_cycles(studio, operation, a, b):
+    material, tree, node = studio.material("ShaderNodeEmission")
+    math = tree.nodes.new("ShaderNodeMath")
+    math.operation, math.inputs[0].default_value, math.inputs[1].default_value = operation, a, b
+    plus = tree.nodes.new("ShaderNodeMath")
+    plus.inputs[1].default_value = 0.5
+    tree.links.new(math.outputs[0], plus.inputs[0])
+    tree.links.new(plus.outputs[0], node.inputs["Strength"])
+    studio.sphere(material)
+    if a in (0, 1e30):  # infinite in Cycles, whose image is black
+        assert studio.render().max() == pytest.approx(0.5, rel=1e-3)
+    else:
+        assert studio.ratio() == pytest.approx(1, abs=0.02)
+
+
+def test_gamma_of_black(studio):
+    material, tree, node = studio.material("ShaderNodeEmission")
+    gamma = tree.nodes.new("ShaderNodeGamma")
+    gamma.inputs["Color"].default_value, gamma.inputs["Gamma"].default_value = (0.25, 0, 0.5, 1), -1
+    tree.links.new(gamma.outputs[0], node.inputs["Color"])
+    studio.sphere(material)
+    assert studio.ratio() == pytest.approx(1, abs=0.02)
 
 
 def test_unknown_values_are_baked_with_a_warning(studio, capfd):

@@ -243,11 +243,21 @@ def test_cameras(studio, name):
     assert_same(studio, 0.04)
 
 
-def test_depth_of_field(studio):
+@pytest.mark.parametrize("scale", [1, 3])
+def test_depth_of_field(studio, scale):
+    """The scale of a camera moves no focus."""
     posts(studio)
+    studio.cam.scale = (scale,) * 3
     dof = studio.cam.data.dof
     dof.use_dof, dof.aperture_fstop, dof.focus_object = True, 0.05, studio.scene.objects["Sphere.001"]
     assert_same(studio, 0.04)
+
+
+def test_orthographic_views_of_pixels_that_are_not_square(studio):
+    posts(studio)
+    studio.cam.data.type, studio.cam.data.ortho_scale = "ORTHO", 5
+    studio.scene.render.pixel_aspect_y = 2
+    assert_same(studio, 0.06)
 
 
 def test_upright_images_and_pixels_that_are_not_square(studio):
@@ -264,6 +274,57 @@ def test_borders(studio):
     render.use_border = render.use_crop_to_border = True
     render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.25, 0.75, 0.5, 1
     assert studio.render().shape == (24, 32, 3)
+    assert_same(studio)
+
+
+@pytest.mark.parametrize("crops", [False, True])
+@pytest.mark.parametrize("size, percentage, border", [
+    ((100, 100), 29, None), ((1000, 70), 7, None), ((10, 10), 100, (0.1, 0.7, 0.3, 0.9)), ((97, 61), 57, (0.2, 0.6, 0.05, 0.8)),
+])
+def test_images_have_the_size_that_blender_gives_them(studio, size, percentage, border, crops):
+    """Its integers are those of its own arithmetic."""
+    posts(studio)
+    render = studio.scene.render
+    render.resolution_x, render.resolution_y = size
+    render.resolution_percentage = percentage
+    if border:
+        render.use_border, render.use_crop_to_border = True, crops
+        render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = border
+    studio.scene.etendue.samples = studio.scene.cycles.samples = 4
+    ours = studio.render()
+    reference = studio.render("CYCLES")
+    assert ours.shape == reference.shape and ours.mean() == pytest.approx(reference.mean(), rel=0.15)
+    assert ((ours.sum(axis=2) > 0) == (reference.sum(axis=2) > 0)).mean() > 0.98
+
+
+def test_texts_that_share_their_data_have_modifiers_of_their_own(studio):
+    text = bpy.data.curves.new("Text", "FONT")
+    text.body, text.extrude = "O", 0.1
+    text.materials.append(diffuse(studio))
+    for x, copies in ((-1.5, 1), (0.2, 3)):
+        thing = studio._add("Letter", text)
+        thing.location = (x, 0, 0.1)
+        if copies > 1:
+            thing.modifiers.new("Array", "ARRAY").count = copies
+    studio.plane(material=diffuse(studio, (0.1, 0.1, 0.1), "Ground"))
+    lamps(studio)
+    assert_same(studio, 0.05)
+
+
+def test_materials_of_geometry_nodes(studio):
+    tree = bpy.data.node_groups.new("Red", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    grid, cube, paint, copies = (tree.nodes.new(f"GeometryNode{n}") for n in ("MeshGrid", "MeshCube", "SetMaterial", "InstanceOnPoints"))
+    paint.inputs["Material"].default_value = diffuse(studio, (0.9, 0.02, 0.02), "Red")
+    cube.inputs["Size"].default_value = (0.4, 0.3, 0.5)
+    grid.inputs["Size X"].default_value = 3
+    tree.links.new(grid.outputs["Mesh"], copies.inputs["Points"])
+    tree.links.new(cube.outputs["Mesh"], paint.inputs["Geometry"])
+    tree.links.new(paint.outputs[0], copies.inputs["Instance"])
+    tree.links.new(copies.outputs[0], tree.nodes.new("NodeGroupOutput").inputs[0])
+    studio.plane(material=diffuse(studio, (0.1, 0.9, 0.1), "Green")).modifiers.new("Red", "NODES").node_group = tree
+    studio.plane(material=diffuse(studio, name="Ground"))
+    lamps(studio)
     assert_same(studio)
 
 

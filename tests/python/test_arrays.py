@@ -176,3 +176,9 @@ def test_a_wrong_image_says_what_was_expected(data: Any, message: str) -> None:
 def test_an_image_is_a_file_or_an_array() -> None:
     with pytest.raises(et.SceneError, match='give "data" or "filename", not both'):
         et.load_dict(lamp({"data": np.ones((2, 2)), "filename": "a.png"}))
+
+
+def test_normals_that_are_none_are_a_warning() -> None:
+    normals = np.array([[0, 0, 1], [np.nan, 0, 0], [0, 0, 0], [0, 0, 1]])
+    scene = et.load_dict(scene_of(square(normals=normals))).build()
+    assert scene.warnings[0] == "dict: thing: mesh: 2 normals that were zero or not finite are computed from the triangles"

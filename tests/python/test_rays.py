@@ -96,6 +96,14 @@ def test_masks_stop_rays_that_they_halve() -> None:
         assert of.ray_intersect((0, 0, 5), (0, 0, -1)).is_hit == hit == of.occluded((0, 0, 5), (0, 0, -1))
 
 
+def test_directions_of_any_length(scene: et.Scene) -> None:
+    expected = scene.ray_intersect((0, 3, 7), (0, 0, -1))
+    assert expected.is_hit
+    for length in (1e-300, 1e-30, 1e30):
+        found = scene.ray_intersect((0, 3, 7), (0, 0, -length))
+        assert found.t == expected.t and (found.p == expected.p).all()
+
+
 @pytest.mark.parametrize(
     "arguments, message",
     [

@@ -39,6 +39,37 @@ def test_codes_are_written_as_they_are(tmp_path: Path) -> None:
     np.testing.assert_array_equal(et.tonemap(et.read_image(tmp_path / "b.png"), "srgb"), codes[:, ::2])
 
 
+def test_codes_are_srgb_wherever_images_are_radiance() -> None:
+    codes = np.random.default_rng(1).integers(0, 256, (4, 8, 3)).astype(np.uint8)
+    np.testing.assert_array_equal(et.tonemap(codes, "srgb"), codes)
+    linear = np.where(codes / 255 <= 0.04045, codes / 255 / 12.92, ((codes / 255 + 0.055) / 1.055) ** 2.4)
+    assert et.diff(codes, codes[::-1]) == et.diff(linear, linear[::-1])
+    with pytest.raises(ValueError, match="complex"):
+        et.tonemap(np.ones((4, 4, 3)) * 1j)
+
+
+def test_descriptions_can_be_edited_while_a_scene_is_built() -> None:
+    d = et.load_dict({"type": "scene", "light": {"type": "constant"}, "sensor": {"type": "perspective"},
+                      **{f"ball{i}": {"type": "sphere", "radius": 1.0} for i in range(300)}})
+    ended = threading.Event()
+
+    def edit() -> None:
+        i = 0
+        while not ended.is_set():
+            d["more"] = {"type": "sphere", "center": [i, 0, 0]}
+            del d["more"]
+            i += 1
+
+    thread = threading.Thread(target=edit)
+    thread.start()
+    try:
+        for _ in range(100):
+            assert d.build(threads=1).info()["shapes"] in (300, 301)
+    finally:
+        ended.set()
+        thread.join()
+
+
 @pytest.mark.parametrize("shape", [(0, 0, 3), (0, 8, 3), (8, 0, 3), (0, 8)])
 def test_empty_images_are_refused(tmp_path: Path, shape: tuple[int, ...]) -> None:
     empty = np.zeros(shape, np.float32)

@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -194,6 +195,91 @@ def test_objects_that_double_are_refused() -> None:
         et.load_dict(textures)
 
 
+def test_scalars_of_numpy_are_those_of_python() -> None:
+    def scene(number: Any, flag: Any, count: Any) -> et.Description:
+        return et.load_dict({
+            "type": "scene", "sensor": {"type": "perspective", "fov": number, "film": {"type": "hdrfilm", "width": count}},
+            "ball": {"type": "sphere", "radius": number, "flip_normals": flag, "center": [number, 1, 2]},
+        })
+
+    expected = scene(0.5, True, 8).dump()
+    for number, flag, count in (
+        (np.float64(0.5), np.True_, np.int64(8)), (np.float32(0.5), np.bool_(True), np.uint8(8)),
+        (np.array(0.5), np.array(True), np.array(8)), (np.array(0.5, np.float16), True, 8),
+    ):
+        assert scene(number, flag, count).dump() == expected
+
+
+def test_what_was_removed_can_be_added_again() -> None:
+    d = et.load_dict({"type": "scene", "ball": {"type": "sphere", "bsdf": {"type": "diffuse", "id": "paint"}}})
+    before = d.dump()
+    for _ in range(2):
+        del d["ball"]
+        d["ball"] = {"type": "sphere", "bsdf": {"type": "diffuse", "id": "paint"}}
+    assert d.dump() == before
+    # An object in the place of another one, which has the same id within.
+    d["ball"] = {"type": "sphere", "radius": 2.0, "bsdf": {"type": "diffuse", "id": "paint"}}
+    # Or that refers to what was within.
+    d["ball"] = {"type": "sphere", "radius": 1.0, "bsdf": {"type": "ref", "id": "paint"}}
+    d["other"] = {"type": "sphere", "bsdf": {"type": "ref", "id": "paint"}}
+    with pytest.raises(et.SceneError, match='the id "paint" is taken'):
+        d["ball"] = {"type": "sphere", "bsdf": {"type": "diffuse", "id": "paint"}}
+    del d["other"]
+    del d["ball"]
+    with pytest.raises(et.SceneError, match='no object has the id "paint"'):
+        d["other"] = {"type": "sphere", "bsdf": {"type": "ref", "id": "paint"}}
+
+
+def test_lists_that_contain_themselves_are_refused() -> None:
+    rows: list[Any] = []
+    rows.append(rows)
+    with pytest.raises(et.SceneError, match="expected a number, a text, three numbers, or a 4x4 matrix"):
+        et.load_dict({"type": "scene", "ball": {"type": "sphere", "to_world": rows}})
+
+
+def test_readers_name_their_files() -> None:
+    d = et.load_dict({"type": "scene", "ball": {"type": "sphere"}}, file="a.scene", warnings=["a.scene: fog is left out"])
+    assert (d.file, d.warnings) == ("a.scene", ["a.scene: fog is left out"])
+    with pytest.raises(et.SceneError, match="^a.scene: ball/radios"):
+        et.load_dict({"type": "scene", "ball": {"type": "sphere", "radios": 1.0}}, file="a.scene").build()
+    with pytest.raises(et.SceneError, match="^a.scene: ball: unknown plug-in"):
+        et.load_dict({"type": "scene", "ball": {"type": "spere"}}, file="a.scene")
+
+
+def test_descriptions_are_saved(tmp_path: Path, program: str) -> None:
+    """With meshes and images, under names from which other programs know their format."""
+    codes = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [255, 255, 255]]], np.uint8)
+    image = {"uint8": codes, "colours": codes / np.float32(255), "grey": codes[..., 0] / np.float32(255)}
+    square = {"vertices": [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], "faces": [[0, 1, 2], [0, 2, 3]],
+              "uvs": [[0, 1], [1, 1], [1, 0], [0, 0]]}
+    d = et.load_dict({
+        "type": "scene", "light": {"type": "constant"},
+        "sensor": {"type": "perspective", "to_world": et.look_at((0, 0, 8), (0, 0, 0)),
+                   "film": {"type": "hdrfilm", "width": 32, "height": 16}},
+        **{name: {"type": "mesh", **square, "to_world": et.translate(3 * i - 3, 0, 0), "bsdf": {
+            "type": "diffuse", "reflectance": {"type": "bitmap", "data": data}}} for i, (name, data) in enumerate(image.items())},
+    })
+    d.save(tmp_path / "new" / "scene.xml")
+    files = sorted(p.suffix for p in (tmp_path / "new" / "scene_files").iterdir())
+    assert files == [".pfm", ".pfm", ".ply", ".ply", ".ply", ".png"]
+    expected = et.render(d, "path", spp=4, progress=False).image
+    np.testing.assert_array_equal(et.render(tmp_path / "new" / "scene.xml", "path", spp=4, progress=False).image, expected)
+    subprocess.run([program, "render", "scene.xml", "-i", "path", "--spp", "4", "-o", "image.exr"], cwd=tmp_path / "new", check=True)
+    np.testing.assert_array_equal(et.read_image(tmp_path / "new" / "image.exr"), expected)
+    with pytest.raises(ValueError, match=r'saved as .xml, not as "scene.json"'):
+        d.save("scene.json")
+
+
+def test_descriptions_are_saved_for_mitsuba(tmp_path: Path) -> None:
+    d = et.load_dict({"type": "scene", "light": {"type": "constant"}, "ball": {
+        "type": "sphere", "bsdf": {"type": "orennayar", "sigma": 20.0}}})
+    d.save(tmp_path / "own.xml")
+    assert "orennayar" in (tmp_path / "own.xml").read_text()
+    with pytest.warns(UserWarning, match="orennayar"):
+        d.save(tmp_path / "plain.xml", mitsuba=True)
+    assert "orennayar" not in (tmp_path / "plain.xml").read_text() and "orennayar" in d.dump()
+
+
 def test_paths_are_limited() -> None:
     # Groups within groups are made once, but many paths lead to the innermost.
     groups: dict[str, object] = {"type": "scene", "g0": {"type": "shapegroup", "ball": {"type": "sphere"}}}
@@ -269,6 +355,8 @@ def test_files_and_descriptions_are_rendered_as_scenes_are(scenes: Path) -> None
         assert et.render(name, "path:max_depth=1", spp=1, progress=False).image.shape == (400, 400, 3)
     with pytest.raises(RuntimeError, match="there is no such file"):
         et.render("none.xml")
-    for wrong in (None, {}, 3):
-        with pytest.raises(TypeError, match="a scene is a Scene, a Description or the name of a file, but found"):
+    as_dict = d.to_dict()
+    np.testing.assert_array_equal(et.render({**as_dict}, "path", spp=1, progress=False).image, image)
+    for wrong in (None, [], 3):
+        with pytest.raises(TypeError, match="a scene is a Scene, a Description, a dict or the name of a file, but found"):
             et.render(wrong)  # type: ignore[arg-type]

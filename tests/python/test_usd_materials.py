@@ -285,6 +285,80 @@ def test_nodes_of_materialx(tmp_path: Path) -> None:
     image(load(tmp_path, CAMERA + SKY + material("color3f inputs:base_color.connect = </Paint/Product.outputs:out>", nodes, **STANDARD)))
 
 
+DOCUMENT = """<?xml version="1.0"?>
+<materialx version="1.38" colorspace="lin_rec709">
+  <nodegraph name="NG_Paint">
+    <input name="tint" type="color3" value="0.5, 1, 1"/>
+    <tiledimage name="picture" type="color3">
+      <input name="file" type="filename" value="four.png" colorspace="srgb_texture"/>
+      <input name="uvtiling" type="vector2" value="2, 3"/>
+    </tiledimage>
+    <multiply name="product" type="color3">
+      <input name="in1" type="color3" nodename="picture"/>
+      <input name="in2" type="color3" interfacename="tint"/>
+    </multiply>
+    <output name="out" type="color3" nodename="product"/>
+  </nodegraph>
+  <standard_surface name="SR_Paint" type="surfaceshader">
+    <input name="base" type="float" value="1"/>
+    <input name="base_color" type="color3" nodegraph="NG_Paint" output="out"/>
+    <input name="specular_roughness" type="float" value="0.4"/>
+  </standard_surface>
+  <surfacematerial name="Paint" type="material"><input name="surfaceshader" type="surfaceshader" nodename="SR_Paint"/></surfacematerial>
+  <open_pbr_surface name="SR_Gold" type="surfaceshader">
+    <input name="base_color" type="color3" value="0.735, 0.5, 0" colorspace="srgb_texture"/>
+    <input name="base_metalness" type="float" value="1"/>
+  </open_pbr_surface>
+  <surfacematerial name="Gold" type="material"><input name="surfaceshader" type="surfaceshader" nodename="SR_Gold"/></surfacematerial>
+</materialx>
+"""
+REFERRING = """def Scope "Looks" (references = @looks/looks.mtlx@</MaterialX>) {}
+    def Mesh "Quad" (prepend apiSchemas = ["MaterialBindingAPI"]) {
+        int[] faceVertexCounts = [4]
+        int[] faceVertexIndices = [0, 1, 2, 3]
+        point3f[] points = [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)]
+        texCoord2f[] primvars:st = [(0, 0), (1, 0), (1, 1), (0, 1)] ( interpolation = "vertex" )
+        uniform token subdivisionScheme = "none"
+        rel material:binding = </Looks/Materials/%s>
+    }
+    """
+
+
+def test_documents_of_materialx(tmp_path: Path) -> None:
+    """References to documents are those of USD's plug-in, and their nodes those of stages."""
+    (tmp_path / "looks").mkdir()
+    png(tmp_path / "looks" / "four.png", FOUR)
+    (tmp_path / "looks" / "looks.mtlx").write_text(DOCUMENT)
+    paint = load(tmp_path, CAMERA + SKY + REFERRING % "Paint")
+    p = paint["/Looks/Materials/Paint.bsdf"]
+    assert p["type"] == "principled" and p["roughness"] == pytest.approx(0.4)
+    assert p["base_color"]["type"] == "scale" and p["base_color"]["scale"]["value"] == [0.5, 1, 1]
+    bitmap = p["base_color"]["value"]
+    assert "raw" not in bitmap and np.diag(bitmap["to_uv"])[:2] == pytest.approx([2, 3])
+    assert image(paint).mean() > 0.01
+    gold = load(tmp_path, CAMERA + SKY + REFERRING % "Gold")["/Looks/Materials/Gold.bsdf"]
+    assert gold["base_color"]["value"] == pytest.approx([0.4995, 0.2140, 0], abs=1e-3) and gold["metallic"] == 1
+
+
+@pytest.mark.parametrize("change, message", [
+    (("</materialx>", ""), "looks.mtlx: is not a MaterialX document: no element found"),
+    (('nodename="product"', 'nodename="products"'), 'looks.mtlx: Paint: there is no node "products"'),
+    (('nodegraph="NG_Paint"', 'nodegraph="NG"'), 'looks.mtlx: Paint: there is no output "out" of a graph "NG"'),
+    (('interfacename="tint"', 'interfacename="hue"'), 'looks.mtlx: Paint: the graph "NG_Paint" has no input "hue"'),
+    (('value="0.4"', 'value="rough"'), 'looks.mtlx: Paint: "rough" is no float'),
+])
+def test_bad_documents_of_materialx(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+    (tmp_path / "looks").mkdir()
+    (tmp_path / "looks" / "looks.mtlx").write_text(DOCUMENT.replace(*change))
+    with pytest.raises(et.SceneError, match=message):
+        load(tmp_path, CAMERA + SKY + REFERRING % "Paint")
+
+
+def test_a_missing_document_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(et.SceneError, match="looks.mtlx"):
+        load(tmp_path, CAMERA + SKY + REFERRING % "Paint")
+
+
 def test_inputs_without_effect_are_warnings(tmp_path: Path) -> None:
     with pytest.warns(UserWarning, match="/Paint/Surface: inputs:thin_film_thickness has no effect"):
         et.load(write(tmp_path, CAMERA + SKY + material("float inputs:thin_film_thickness = 300", **STANDARD)))

@@ -80,6 +80,57 @@ def test_vertex_and_face_varying_primvars_are_refined(tmp_path: Path) -> None:
     assert sorted(set(linear["colors"][:, 0].round(3))) == pytest.approx(sorted({0, 1 / 6, 1 / 3, 1 / 2, 2 / 3, 5 / 6, 1}), abs=1e-3)
 
 
+TETRAHEDRON = """def Mesh "Cube" {
+    int[] faceVertexCounts = [3, 3, 3, 3]
+    int[] faceVertexIndices = [0, 1, 2, 0, 2, 3, 0, 3, 1, 1, 3, 2]
+    point3f[] points = [(1, 1, 1), (-1, -1, 1), (1, -1, -1), (-1, 1, -1)]
+    uniform token subdivisionScheme = "loop"
+    %s }
+"""
+
+
+def test_loop(tmp_path: Path) -> None:
+    """The first level of a tetrahedron [Loop 1987]: its points and the middles of its edges, at a quarter and at half of their
+    distance from the centre.
+    """
+    one = mesh(tmp_path, TETRAHEDRON % "", subdivision=1)
+    assert len(one["positions"]) == 10 and len(one["triangles"]) == 16
+    rows = np.unique(np.sort(np.abs(one["positions"]).round(5), axis=1), axis=0)
+    assert rows == pytest.approx(np.array([[0, 0, 0.5], [0.25, 0.25, 0.25]]))
+    assert np.einsum("ij,ij->i", one["positions"], one["normals"]).min() > 0.2
+    assert len(mesh(tmp_path, TETRAHEDRON % "", subdivision=3)["triangles"]) == 4 * 64
+    # Sharp edges all around.
+    edges = "int[] creaseIndices = [0, 1, 2, 0, 3, 1, 2, 3]\nint[] creaseLengths = [6, 2]\nfloat[] creaseSharpnesses = "
+    sharp = mesh(tmp_path, TETRAHEDRON % (edges + "[10, 10]"))
+    assert area(sharp) == pytest.approx(area(mesh(tmp_path, TETRAHEDRON % "", subdivision=0)))
+    finite = [area(mesh(tmp_path, TETRAHEDRON % (edges + f"[{s}, {s}]"))) for s in (0, 0.5, 1)]
+    assert sorted(finite) == finite and finite[0] == pytest.approx(area(mesh(tmp_path, TETRAHEDRON % "")))
+    corners = ", ".join(f"({i % 3}, 0, 0)" for i in range(12))
+    linear = mesh(tmp_path, TETRAHEDRON % f'color3f[] primvars:displayColor = [{corners}] ( interpolation = "faceVarying" )',
+                  subdivision=1)
+    assert set(linear["colors"][:, 0]) == {0, 0.5, 1, 1.5, 2}
+
+
+def test_loop_keeps_flat_regular_meshes(tmp_path: Path) -> None:
+    """The inner points of a regular triangulation stay, as do straight boundaries; values of points are those of positions."""
+    n = 4
+    points = [(x + y / 2, y * 0.75**0.5, 0) for y in range(n + 1) for x in range(n + 1)]
+    at = [(y * (n + 1) + x) for y in range(n) for x in range(n)]
+    faces = [c for a in at for c in (a, a + 1, a + n + 1, a + 1, a + n + 2, a + n + 1)]
+    text = f"""def Mesh "Cube" {{ int[] faceVertexCounts = {[3] * (2 * n * n)}
+        int[] faceVertexIndices = {faces}
+        point3f[] points = {points}
+        texCoord2f[] primvars:st = {[p[:2] for p in points]} ( interpolation = "vertex" )
+        color3f[] primvars:displayColor = {points} ( interpolation = "vertex" )
+        int[] cornerIndices = [0, {n}, {n * (n + 1)}, {(n + 1) ** 2 - 1}]
+        float[] cornerSharpnesses = [10, 10, 10, 10]
+        uniform token subdivisionScheme = "loop" }}"""
+    found = mesh(tmp_path, text, subdivision=2)
+    assert area(found) == pytest.approx(n * n * 0.75**0.5)
+    np.testing.assert_allclose(found["positions"], found["colors"], atol=1e-5)
+    assert found["normals"] == pytest.approx(np.tile([0, 0, 1], (len(found["normals"]), 1)))
+
+
 POLYGON = """def Mesh "Cube" {
     int[] faceVertexCounts = [5, 3]
     int[] faceVertexIndices = [0, 1, 2, 3, 4, 5, 6, 7]
@@ -246,5 +297,8 @@ def test_spheres_and_cubes(tmp_path: Path) -> None:
 
 
 def test_schemes_that_are_not_supported_are_warnings(tmp_path: Path) -> None:
-    with pytest.warns(UserWarning, match="/Cube: the scheme loop is not supported: the control mesh is rendered"):
-        et.load(write(tmp_path, CAMERA + SUN + CUBE % 'uniform token subdivisionScheme = "loop"'))
+    with pytest.warns(UserWarning, match="/Cube: the scheme loop is for triangles: the control mesh is rendered") as notes:
+        d = et.load(write(tmp_path, CAMERA + SUN + CUBE % 'uniform token subdivisionScheme = "loop"'))
+    assert len(d["/Cube"]["mesh"]["positions"]) == 8
+    # The description keeps the warnings.
+    assert d.warnings == [str(n.message) for n in notes] and d.file == str(tmp_path / "scene.usda")

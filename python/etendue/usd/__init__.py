@@ -19,9 +19,8 @@ from ._cameras import add_camera
 from ._context import Context, Options
 from ._stage import diagnostics, open_stage, time_code
 from ._traversal import add_prims
-from ._write import write_xml
 
-__all__ = ["load", "write_xml"]
+__all__ = ["load"]
 
 
 def load(
@@ -39,17 +38,19 @@ def load(
     lenient: what is refused otherwise, such as IES profiles or missing references, is left out with a warning.
     stacklevel: which caller warnings are attributed to, as in warnings.warn().
 
-    What has no effect is a UserWarning with the path of the prim. Raises RuntimeError if there is no such file, and SceneError,
+    What has no effect is a UserWarning with the path of the prim, and in Description.warnings. Raises RuntimeError if there is no such file, and SceneError,
     with the file and the path of the prim, if its contents are not valid or are not supported.
     """
     options = Options(dict(variants), time, camera, tuple(purposes), subdivision, lenient)
     name = fspath(file)
     notes: list[str] = []
     with diagnostics(name, notes):
-        stage = open_stage(name, options, notes)
+        stage, documents = open_stage(name, options, notes)
         context = Context(name, stage, time_code(stage, options), options, notes)
         add_camera(context)
         add_prims(context)
+    # USD says that it cannot open them.
+    notes = [note for note in notes if not any(f"{name}@" in note for name in documents)]
     for note in notes:
         warnings.warn(note, stacklevel=stacklevel)
-    return load_dict({"type": "scene", **context.objects}, context.folder)
+    return load_dict({"type": "scene", **context.objects}, context.folder, name, notes)

@@ -4,7 +4,7 @@ import argparse
 import sys
 import warnings
 
-from . import load, write_xml
+from . import load
 
 
 def main() -> int:
@@ -32,7 +32,7 @@ def main() -> int:
             description = load(arguments.input, variants=variants, time=arguments.time, camera=arguments.camera,
                                purposes=arguments.purpose or ("default", "render"), subdivision=arguments.subdivision,
                                lenient=arguments.lenient)
-            write_xml(description, arguments.output)
+            description.save(arguments.output)
     except (RuntimeError, ValueError, OSError) as e:
         print(f"etendue.usd: {e}", file=sys.stderr)
         return 1

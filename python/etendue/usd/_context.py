@@ -138,7 +138,6 @@ def unscaled(m: Matrix) -> Matrix | None:
     return made
 
 
-
 def inverse(m: Matrix) -> Matrix:
     """The inverse of a transform."""
     return np.asarray(np.linalg.inv(m), np.float64)

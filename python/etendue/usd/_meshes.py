@@ -11,7 +11,7 @@ from pxr import UsdGeom, UsdShade
 from ._context import Context, Object, array
 from ._materials import Material, bound_material
 from ._primvars import Integers, Topology, Values, read_primvar, values_of
-from ._subdivision import Surface, refine, refine_corners, smooth_normals
+from ._subdivision import Surface, refine, refine_corners, refine_triangles, smooth_normals
 from ._triangulation import triangulate
 
 MOST_FACES = 1 << 24  # Of a refined mesh.
@@ -113,10 +113,12 @@ def _read(context: Context, prim: Any, topology: Topology, wanted: dict[str, int
         elif columns == 2:
             context.warn(prim, f"has no primvars:{name} for the textures of its material")
     scheme = str(context.get(prim, "subdivisionScheme"))
-    if scheme == "loop":
-        context.warn(prim, "the scheme loop is not supported: the control mesh is rendered")
-    if scheme == "catmullClark" and context.options.subdivision > 0 and topology.counts.min() > 2:
-        return _subdivide(context, prim, topology, points, primvars)
+    can_refine = topology.counts.min() > 2
+    if scheme == "loop" and topology.counts.max() > 3:
+        context.warn(prim, "the scheme loop is for triangles: the control mesh is rendered")
+        can_refine = False
+    if scheme in ("catmullClark", "loop") and context.options.subdivision > 0 and can_refine:
+        return _subdivide(context, prim, topology, points, primvars, scheme == "loop")
     normals = _normals(context, prim, topology) if scheme == "none" else None
     return _Mesh(topology, points, np.arange(len(topology.counts)), normals, primvars)
 
@@ -132,7 +134,7 @@ def _normals(context: Context, prim: Any, topology: Topology) -> Values | None:
 
 
 def _subdivide(
-    context: Context, prim: Any, topology: Topology, points: NDArray[np.float64], primvars: dict[str, Values]
+    context: Context, prim: Any, topology: Topology, points: NDArray[np.float64], primvars: dict[str, Values], is_loop: bool
 ) -> _Mesh:
     if len(topology.points) * 4**(context.options.subdivision - 1) > MOST_FACES:
         context.fail(prim, f"{context.options.subdivision} levels of subdivision would make more than {MOST_FACES} faces")
@@ -146,8 +148,8 @@ def _subdivide(
                       _sharp_points(context, prim, topology), np.arange(len(topology.counts)))
     other = {name: v for name, v in primvars.items() if name not in smooth}
     for _ in range(context.options.subdivision):
-        other = {name: refine_corners(v, surface.topology) for name, v in other.items()}
-        surface = refine(surface)
+        other = {name: refine_corners(v, surface.topology, is_loop) for name, v in other.items()}
+        surface = refine_triangles(surface) if is_loop else refine(surface)
     made, at = dict(other), 3
     for name, v in smooth.items():
         width = v.rows.shape[1]

@@ -10,6 +10,7 @@ from pxr import Tf, Usd, UsdUtils
 
 from .._etendue import SceneError
 from ._context import Options
+from ._mtlx import add_documents
 
 
 @contextmanager
@@ -26,7 +27,9 @@ def diagnostics(file: str, notes: list[str]) -> Iterator[None]:
 
 
 def open_stage(file: str, options: Options, notes: list[str]) -> Any:
-    """The stage of a file with its payloads and the chosen variants. Missing references are errors, or notes if lenient."""
+    """The stage of a file with its payloads and the chosen variants, and what has to live as long as it. Missing references are
+    errors, or notes if lenient.
+    """
     if not os.path.isfile(file):
         raise RuntimeError(f"{file}: there is no such file")
     try:
@@ -35,12 +38,15 @@ def open_stage(file: str, options: Options, notes: list[str]) -> Any:
         raise SceneError(f"{file}: is not a USD file: {_one_line(e.args[0].commentary)}") from None
     for path, choices in options.variants.items():
         _choose_variants(file, stage, path, choices)
+    documents = add_documents(stage)
     for error in stage.GetCompositionErrors():
         text = f"{file}: {_one_line(str(error))}"
+        if any(name in text for name in documents):
+            continue
         if not options.lenient:
             raise SceneError(text)
         notes.append(text)
-    return stage
+    return stage, documents
 
 
 def time_code(stage: Any, options: Options) -> Any:

@@ -1,9 +1,11 @@
-"""Refinement of subdivision surfaces: Catmull-Clark with semi-sharp creases [Catmull & Clark 1978; DeRose et al. 1998].
+"""Refinement of subdivision surfaces: Catmull-Clark and Loop with semi-sharp creases [Catmull & Clark 1978; Loop 1987; DeRose et
+al. 1998].
 
 The rules are those of OpenSubdiv. Vertex values are smooth; varying and face-varying values are interpolated linearly.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,40 +61,79 @@ def refine(surface: Surface) -> Surface:
     middles = v[edges.ends].mean(1)
     around = _sum(edges.of_corners, centres[t.faces], len(edges.ends))
     smooth = np.where((edges.uses == 2)[:, None], (2 * middles + around) / 4, middles)
-    share = np.clip(edges.sharpness, 0, 1)[:, None]
-    edge_points = (1 - share) * smooth + share * middles
-    moved = _moved_points(surface, edges, centres, middles)
+    edge_points = _blended(edges, smooth, middles)
+    n = _valence(surface, edges)[:, None]
+    faces = np.bincount(t.points, minlength=count)[:, None]
+    mean_centres = _sum(t.points, centres[t.faces], count) / np.maximum(faces, 1)
+    mean_middles = _sum(edges.ends.reshape(-1), np.repeat(middles, 2, 0), count) / n
+    moved = _moved_points(surface, edges, (mean_centres + 2 * mean_middles + (n - 3) * v) / n)
 
     corner = np.arange(len(t.points))
     first_edge, first_face = count, count + len(edges.ends)
     quads = np.stack([t.points, first_edge + edges.of_corners, first_face + t.faces,
                       first_edge + edges.of_corners[t.previous[corner]]], 1)
     topology = Topology(np.full(len(quads), 4), quads.reshape(-1), first_face + len(t.counts))
+    return _refined(surface, edges, topology, np.concatenate([moved, edge_points, centres]), surface.parents[t.faces])
+
+
+def refine_triangles(surface: Surface) -> Surface:
+    """One level of Loop's scheme: each triangle becomes four."""
+    t, v = surface.topology, surface.vertices
+    edges, count = _edges(surface), surface.topology.count_of_points
+    middles = v[edges.ends].mean(1)
+    opposite = _sum(edges.of_corners, v[t.points[t.previous]], len(edges.ends))
+    smooth = np.where((edges.uses == 2)[:, None], (6 * middles + opposite) / 8, middles)
+    n = _valence(surface, edges)[:, None]
+    share = 5 / 8 - (3 / 8 + np.cos(2 * np.pi / n) / 4)**2  # Of all neighbours together.
+    around = _sum(edges.ends.reshape(-1), v[edges.ends[:, ::-1].reshape(-1)], count) / n
+    moved = _moved_points(surface, edges, (1 - share) * v + share * around)
+    p, e = t.points.reshape(-1, 3), count + edges.of_corners.reshape(-1, 3)
+    topology = Topology(np.full(4 * len(p), 3), _quartered(p, e), count + len(edges.ends))
+    return _refined(surface, edges, topology, np.concatenate([moved, _blended(edges, smooth, middles)]),
+                    np.repeat(surface.parents, 4))
+
+
+def _quartered(corners: NDArray[Any], middles: NDArray[Any]) -> NDArray[Any]:
+    """The corners of the four parts of triangles, from their own and those in the middles of the edges that follow them."""
+    (a, b, c), (ab, bc, ca) = (np.moveaxis(x, 1, 0) for x in (corners, middles))
+    parts = np.stack([np.stack(x, 1) for x in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))], 1)
+    return parts.reshape(-1, *corners.shape[2:])
+
+
+def _blended(edges: _Edges, smooth: Reals, middles: Reals) -> Reals:
+    share = np.clip(edges.sharpness, 0, 1)[:, None]
+    made: Reals = (1 - share) * smooth + share * middles
+    return made
+
+
+def _valence(surface: Surface, edges: _Edges) -> Integers:
+    """Edges at each point, at least 1."""
+    count: Integers = np.bincount(edges.ends.reshape(-1), minlength=surface.topology.count_of_points)
+    return np.maximum(count, 1)
+
+
+def _refined(surface: Surface, edges: _Edges, topology: Topology, vertices: Reals, parents: Integers) -> Surface:
+    """The points of edges are those after the old ones; what is sharp is less sharp."""
+    count = surface.topology.count_of_points
     sharp: dict[tuple[int, int], float] = {}
     for e in np.flatnonzero((edges.sharpness > 0) & np.isfinite(edges.sharpness)):
         left = _softer(float(edges.sharpness[e]))
         if left > 0:
             for end in edges.ends[e]:
-                sharp[int(end), int(first_edge + e)] = left
+                sharp[int(end), int(count + e)] = left
     points = np.concatenate([[_softer(float(s)) for s in surface.point_sharpness],
                              np.zeros(topology.count_of_points - count)])
-    return Surface(topology, np.concatenate([moved, edge_points, centres]), sharp, points, surface.parents[t.faces])
+    return Surface(topology, vertices, sharp, points, parents)
 
 
 def _softer(sharpness: float) -> float:
     return sharpness if sharpness >= INFINITE else max(sharpness - 1, 0.0)
 
 
-def _moved_points(surface: Surface, edges: _Edges, centres: Reals, middles: Reals) -> Reals:
-    t, v, count = surface.topology, surface.vertices, surface.topology.count_of_points
-    faces = np.bincount(t.points, minlength=count)
+def _moved_points(surface: Surface, edges: _Edges, smooth: Reals) -> Reals:
+    """The old points after a step; `smooth` are those without creases."""
+    v, count = surface.vertices, surface.topology.count_of_points
     valence = np.bincount(edges.ends.reshape(-1), minlength=count)
-    both = edges.ends.reshape(-1)
-    n = np.maximum(valence, 1)[:, None]
-    mean_centres = _sum(t.points, centres[t.faces], count) / np.maximum(faces, 1)[:, None]
-    mean_middles = _sum(both, np.repeat(middles, 2, 0), count) / n
-    smooth = (mean_centres + 2 * mean_middles + (n - 3) * v) / n
-
     is_sharp = edges.sharpness > 0
     sharp_ends = edges.ends[is_sharp].reshape(-1)
     creases = np.bincount(sharp_ends, minlength=count)
@@ -109,15 +150,22 @@ def _moved_points(surface: Surface, edges: _Edges, centres: Reals, middles: Real
     return np.where((valence > 0)[:, None], moved, v)
 
 
-def refine_corners(values: Values, topology: Topology) -> Values:
+def refine_corners(values: Values, topology: Topology, is_loop: bool) -> Values:
     """Values of the corners of a refined mesh, linear within the faces of the one before."""
     if values.interpolation in ("constant", "uniform"):
         return Values(values.rows, np.repeat(values.of_corners, 4), values.interpolation)
     rows = values.at_corners().astype(np.float64)
+    if is_loop:
+        middles = (rows + rows[topology.next]) / 2
+        return _face_varying(_quartered(rows.reshape(-1, 3, rows.shape[1]), middles.reshape(-1, 3, rows.shape[1])))
     centres = _sum(topology.faces, rows, len(topology.counts)) / topology.counts[:, None]
     after = (rows + rows[topology.next]) / 2
     made = np.stack([rows, after, centres[topology.faces], after[topology.previous]], 1)
-    unique, same = np.unique(made.reshape(-1, rows.shape[1]).astype(np.float32), axis=0, return_inverse=True)
+    return _face_varying(made.reshape(-1, rows.shape[1]))
+
+
+def _face_varying(rows: Reals) -> Values:
+    unique, same = np.unique(rows.astype(np.float32), axis=0, return_inverse=True)
     return Values(unique, same.reshape(-1), "faceVarying")
 
 

@@ -144,3 +144,5 @@ MODELS = {
          "subsurface_color", "fuzz_color", "fuzz_roughness", "coat_color", "coat_ior", "coat_roughness_anisotropy",
          "coat_darkening", "thin_film_weight", "geometry_thin_walled", "geometry_coat_normal", "geometry_tangent")),
 }
+# As a node of MaterialX.
+MODELS["ND_UsdPreviewSurface_surfaceshader"] = MODELS["UsdPreviewSurface"]
