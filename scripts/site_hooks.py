@@ -6,6 +6,7 @@ import pathlib
 import posixpath
 import re
 
+from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -42,9 +43,8 @@ LINK = re.compile(r"(\]\(\s*<?|\s(?:src|href)=\")([^)\s>\"#]+)")
 
 def source_of(page):
     """The folder, relative to ROOT, from which the links of a page begin."""
-    for source, name in PAGES.items():
-        if page.src_uri == name:
-            return ""
+    if page.src_uri in PAGES.values():
+        return ""
     return posixpath.dirname(posixpath.join("docs", page.src_uri))
 
 
@@ -55,7 +55,18 @@ def on_files(files, config):
     if "ETENDUE_PYTHON" not in os.environ:
         page = page[:page.index("## The compiled")] + page[page.index("## The path space"):]
     files.append(File.generated(config, "python-reference.md", content=page))
+    files.append(File.generated(config, "worker.js", abs_src_path=str(ROOT / "scripts/site_worker.js")))
     return files
+
+
+def on_post_page(output, page, config):
+    """The pages load nothing from other sites."""
+    worker = posixpath.relpath("worker.js", posixpath.dirname(page.file.dest_uri) or ".")
+    output, count = re.subn(r'<script src="https://unpkg.com/iframe-worker/shim"></script>',
+                            f'<script src="{worker}"></script>', output)
+    if count != 1 or re.search(r'<(?:script|link|img)[^>]* (?:src|href)="https?:', output):
+        raise PluginError(f"{page.file.src_uri}: it loads something from another site")
+    return output
 
 
 def on_page_markdown(markdown, page, config, files):
@@ -85,7 +96,7 @@ def on_page_markdown(markdown, page, config, files):
             name = re.sub(r"\.md$", ".html", name)
         return match[1] + posixpath.relpath(name, posixpath.dirname(page.file.src_uri) or ".")
 
-    lines, fence = [], False
+    parts = []
     for part in re.split(r"(^```.*?^```[ ]*$)", markdown, flags=re.MULTILINE | re.DOTALL):
-        lines.append(part if part.startswith("```") else LINK.sub(replaced, part))
-    return "".join(lines)
+        parts.append(part if part.startswith("```") else LINK.sub(replaced, part))
+    return "".join(parts)

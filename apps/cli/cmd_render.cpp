@@ -28,6 +28,7 @@
 #include "preview.h"
 #include "render/aov.h"
 #include "render/checkpoint.h"
+#include "render/method_choice.h"
 #include "render/render_report.h"
 #include "render/render_request.h"
 #include "render/renderer.h"
@@ -77,6 +78,8 @@ private:
     std::unique_ptr<Job> make_job(const Ranks& ranks) const;
     void render(Job& job, const Ranks& ranks) const;
     RenderSettings settings_for(const Scene& scene) const;
+    /// Where `auto` renders. `earlier`: the choice of the checkpoint from which the rendering goes on; may be empty.
+    void choose_method(Job& job, const std::string& earlier) const;
     /// First and number of the passes of --passes; the number is 0 if they are not given.
     std::pair<uint64_t, uint64_t> pass_range() const;
     /// The file in which checkpoints are written; empty if there is none.
@@ -299,6 +302,14 @@ RenderSettings RenderCommand::settings_for(const Scene& s) const {
     return settings_of(r, s);
 }
 
+void RenderCommand::choose_method(Job& job, const std::string& earlier) const {
+    if (earlier.empty())
+        job.settings = with_chosen_method(job.scene, job.settings);
+    else
+        job.settings = with_chosen_method(job.settings, MethodChoice::from_json(earlier));
+    if (job.settings.choice && !quiet) message("{}\n", job.settings.choice->message());
+}
+
 std::unique_ptr<Renderer> make_renderer(const Scene& s, const RenderSettings& settings) try {
     return std::make_unique<Renderer>(s, settings);
 } catch (const std::bad_alloc&) {
@@ -450,6 +461,7 @@ std::unique_ptr<RenderCommand::Job> RenderCommand::make_job(const Ranks& ranks) 
     print_warnings(warnings_of(s, request.integrator));
     job->settings = settings_for(s);
     job->settings.ranks = &ranks;
+    choose_method(*job, earlier ? earlier->header().choice : "");
     if (job->settings.technique_depth > 0 && !quiet)
         message("technique images of paths up to {} edges: {:.0f} MiB\n", technique_depth,
                 double(TechniqueImages::memory_bytes(s.film().pixel_count(), technique_depth)) /

@@ -24,6 +24,7 @@
 #include "math/statistics.h"
 #include "render/aov.h"
 #include "render/merging.h"
+#include "render/method_choice.h"
 #include "render/render_report.h"
 #include "render/render_request.h"
 #include "render/renderer.h"
@@ -55,6 +56,13 @@ std::string python_identity(nb::handle integrator) {
         nb::module_::import_("etendue._integrator").attr("identity")(integrator));
 }
 
+/// The pilots of `auto` take time.
+RenderSettings with_method(const Scene& scene, const RenderSettings& settings) {
+    use_threads();
+    const nb::gil_scoped_release no_gil;
+    return with_chosen_method(scene, settings);
+}
+
 /// Trial renderings of the integrator take time.
 Renderer make_renderer(const Scene& scene, const RenderSettings& settings) {
     use_threads();
@@ -80,7 +88,8 @@ std::vector<Rgb> half_width_of(const Film& film) {
 class Rendering {
 public:
     Rendering(ScenePtr scene, nb::handle integrator, const RenderRequest& request)
-        : scene_(std::move(scene)), settings_(settings_for(scene_->scene, integrator, request)),
+        : scene_(std::move(scene)),
+          settings_(with_method(scene_->scene, settings_for(scene_->scene, integrator, request))),
           python_integrator_(settings_.integrator.make ? python_identity(integrator) : ""),
           renderer_(make_renderer(scene_->scene, settings_)), conditions_(conditions()) {}
 
@@ -220,7 +229,11 @@ public:
     /// Before the first pass.
     void resume(const std::string& file) {
         use_threads();
-        CheckpointFile(file).resume(renderer_, conditions_, log_);
+        CheckpointFile checkpoint(file);
+        checkpoint.resume(renderer_, conditions_, log_);
+        if (const std::string& choice = checkpoint.header().choice; !choice.empty())
+            settings_.choice =
+                std::make_shared<const MethodChoice>(MethodChoice::from_json(choice));
         const std::scoped_lock lock(mutex_);
         now_ = Now{renderer_.film().passes(), renderer_.seconds(), {}, 0, {}};
     }

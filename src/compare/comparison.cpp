@@ -9,6 +9,7 @@
 
 #include "compare/memory.h"
 #include "image/flip.h"
+#include "integrator/auto.h"
 #include "render/warnings.h"
 #include "system/failure.h"
 
@@ -62,6 +63,7 @@ RenderSettings render_settings(const CompareSettings& s, const IntegratorSpec& i
     settings.seed = seed;
     settings.threads = s.threads;
     settings.shown = s.shown;
+    static_cast<RenderLimits&>(settings) = s.limits;  // by which `auto` chooses
     return settings;
 }
 
@@ -174,6 +176,7 @@ void check_inner_paths(const Scene& scene, const std::vector<MethodSpec>& method
                        const IntegratorSpec& reference) {
     // Methods with learned weights of pairs have no fixed counts, since the weights differ between renderings.
     const auto fixed_counts = [&](const IntegratorSpec& spec) -> std::optional<TechniqueCounts> {
+        if (is_auto(spec)) return std::nullopt;
         const auto integrator = make_integrator(spec);
         const TechniqueCounts counts = integrator->counts(scene, scene.film().pixel_count());
         const bool learns = counts.gather > 0 || (counts.merge > 0 && counts.connect > 0);

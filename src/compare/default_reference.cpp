@@ -13,10 +13,9 @@ namespace {
 std::string max_depth(const IntegratorSpec& spec) {
     if (const auto found = spec.params.find("max_depth"); found != spec.params.end())
         return found->second;
-    for (const IntegratorEntry& e : integrator_registry())
-        if (spec.name == e.info.name)
-            for (const ParamInfo& p : e.info.params)
-                if (std::string(p.name) == "max_depth") return p.fallback;
+    if (spec.make) return "";
+    for (const ParamInfo& p : integrator_entry(spec.name).info.params)
+        if (std::string(p.name) == "max_depth") return p.fallback;
     return "";
 }
 

@@ -11,9 +11,9 @@ std::vector<ParamInfo> Bidirectional::params() {
     std::vector<ParamInfo> params = sub_path_params();
     params.push_back(
         {"roulette", ParamKind::Float, "0.15",
-         "Threshold of the Russian roulette before shadow rays, in [0, 1], as a fraction of the "
-         "pixel's luminance in earlier passes: a join that would contribute less is tested with a "
-         "probability proportional to its contribution; 0: all joins are tested."});
+         "Shadow rays of small contributions are skipped at random, and the others weighted up. "
+         "Threshold, in [0, 1], as a fraction of the pixel's luminance in earlier passes; 0 traces "
+         "all."});
     params.push_back({"eorr", ParamKind::Bool, "false",
                       "Efficiency-optimised roulette: the threshold is √(V/T) instead, where V is "
                       "the variance of the pixel and T the number of rays of a sample, both from "

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "integrator/auto.h"
 #include "integrator/bdpt.h"
 #include "integrator/light.h"
 #include "integrator/mlt.h"
@@ -210,7 +211,8 @@ std::string meant_integrator(const std::string& given, const std::vector<std::st
 }  // namespace
 
 const IntegratorEntry& integrator_entry(const std::string& name) {
-    std::vector<std::string> known;
+    if (name == auto_entry().info.name) return auto_entry();
+    std::vector<std::string> known{auto_entry().info.name};
     for (const IntegratorEntry& e : integrator_registry()) {
         if (name == e.info.name) return e;
         known.push_back(e.info.name);

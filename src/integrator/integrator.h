@@ -138,8 +138,9 @@ struct IntegratorEntry {
     PluginInfo info;
     std::unique_ptr<Integrator> (*make)(const IntegratorParams& params);
 };
+/// All integrators but `auto`, which chooses one of them.
 const std::vector<IntegratorEntry>& integrator_registry();
-/// Throws std::runtime_error for an unknown name.
+/// Also of `auto`. Throws std::runtime_error for an unknown name.
 const IntegratorEntry& integrator_entry(const std::string& name);
 std::unique_ptr<Integrator> make_integrator(const IntegratorSpec& spec);
 

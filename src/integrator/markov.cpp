@@ -83,12 +83,14 @@ void MarkovIntegrator::trace(const PassContext& pass) {
                                });
         }
         Chains chains = begin(pass, *pilot_);
-        pool_ = 0;
-        for (const ClassPlan& plan : chains.plan) pool_ += plan.pool;
+        pool_ = chains.pool;
         groups_.reset();
         space_ = std::move(chains.space);
         ChainOptions options = options_;
         options.mutations = mutations_per_pixel();
+        options.pool = chains.pool;
+        options.later = chains.later;
+        options.large_step = chains.large_step;
         groups_ = std::make_unique<ChainGroups>(*space_, options, std::move(chains.plan));
     }
     if (is_loaded) {
@@ -156,6 +158,7 @@ std::vector<std::pair<std::string, double>> MarkovIntegrator::figures() const {
         {"normalisation_relative_error", groups_->relative_error_of_b()},
         {"pilot_samples", pilot_->samples},
         {"pool_samples", pool_},
+        {"later_samples", groups_->stats().later_samples},
         {"mutations_per_pixel", mutations_per_pixel()},
         {"longest_stay", groups_->stats().longest_stay}};
     add_step_figures(groups_->stats(), space_->mutations(), kShortest, out);

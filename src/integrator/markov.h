@@ -7,6 +7,7 @@
 #include "integrator/bidirectional.h"
 #include "mcmc/chain_groups.h"
 #include "mcmc/pilot.h"
+#include "mcmc/weighed_sample.h"
 
 namespace etendue {
 
@@ -59,10 +60,13 @@ protected:
     };
     MarkovIntegrator(const IntegratorParams& params, const DepthOptions& depth, StepWorth worth);
 
-    /// The space of states, and the parameters of its classes.
+    /// The space of states, and the parameters of its classes and pools (ChainOptions).
     struct Chains {
         std::unique_ptr<StateSpace> space;
         std::vector<ClassPlan> plan;
+        uint64_t pool;
+        double later = 0;
+        double large_step = 1;
     };
     virtual Chains begin(const PassContext& pass, const Pilot& pilot) = 0;
     /// Makes the steps of a pass.
@@ -75,6 +79,15 @@ protected:
 
     /// A sample of all techniques of `bdpt`, with the walks of `paths`.
     PrimarySample bidirectional_sample(const Scene& scene, const Bidirectional& paths) const;
+    /// The same with the walks of the pilot, as the states of single paths that it consists of.
+    WeighedSample samples_of_paths(const Scene& scene, const Pilot& pilot) const {
+        return {bidirectional_sample(scene, pilot_paths_), pilot.map};
+    }
+    /// Chains whose states are single paths, which are found by these samples.
+    static Chains chains_of_paths(std::unique_ptr<StateSpace> space, std::vector<ClassPlan> plan,
+                                  uint64_t pool) {
+        return {std::move(space), std::move(plan), pool, kLaterSamples, kLargeStep};
+    }
     /// N_L in the weights: the number of pixels over which the eye paths of the film are distributed.
     static uint64_t whole_film_paths(const Scene& scene);
 
@@ -82,6 +95,10 @@ protected:
     Bidirectional paths_;
 
 private:
+    /// Of states that are single paths: samples for each mutation, and what a large step, which tries one technique for one
+    /// length, counts beside a sample of all.
+    static constexpr double kLaterSamples = 1.0 / 16, kLargeStep = 0.25;
+
     /// The counts for the shorter paths. Eye paths make all of them, unless an emitter has no extent.
     static TechniqueCounts direct_counts(const Scene& scene, uint64_t light_paths);
 
@@ -95,7 +112,7 @@ private:
     std::unique_ptr<ChainGroups> groups_;  ///< Set when the first pass starts.
     bool has_begun_ = false;  ///< Whether a pass was kept; until then each starts anew.
     std::optional<Pilot> pilot_;
-    uint64_t pool_ = 0;
+    uint64_t pool_ = 0;              ///< Samples in the first pool of a group.
     std::vector<std::byte> loaded_;  ///< Loaded data of the groups, until they are made.
 };
 

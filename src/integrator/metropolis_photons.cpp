@@ -260,8 +260,12 @@ MapPhotons MetropolisPhotons::trace(const PassContext& context, uint32_t pass,
     pool_ =
         std::max(uint64_t(4 * options_.chains),
                  uint64_t(std::min(kMostPool, pilot_.relative_variance / sqr(options_.precision))));
-    const ChainOptions chains{.groups = 1, .chains = options_.chains, .p_large = options_.p_large};
-    ChainGroups groups(space, chains, {{.chains = options_.chains, .pool = pool_, .c = pilot_.b}});
+    const ChainOptions chains{.groups = 1,
+                              .chains = options_.chains,
+                              .p_large = options_.p_large,
+                              .starts = Starts::Once,
+                              .pool = pool_};
+    ChainGroups groups(space, chains, {{.chains = options_.chains, .c = pilot_.b}});
     PassContext own = context;
     own.index = 0;
     own.seed = hash_combine(hash_combine(context.seed, kChains), pass);

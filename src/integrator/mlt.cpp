@@ -17,7 +17,7 @@ namespace {
 class MltIntegrator final : public MarkovIntegrator {
 public:
     explicit MltIntegrator(const IntegratorParams& p)
-        : MarkovIntegrator(p, DepthOptions::without_roulette(p), {.correlation = 10, .cost = 1}),
+        : MarkovIntegrator(p, DepthOptions::without_roulette(p), {.correlation = 10, .cost = 1.25}),
           user_paths_(p.string("user_paths")),
           user_ratio_(double(p.number("user_ratio", 0.01f, 100.0f))) {}
 
@@ -32,16 +32,21 @@ protected:
             weighted_luminance(pilot.map), LengthChoice(kShortest, longest, pilot.by_technique),
             TechniqueChoice(scene, kShortest, std::min(kTabulated, longest - kShortest + 1),
                             pilot.by_technique)};
-        const ClassPlan plan{.chains = options_.chains,
-                             .pool = pool_samples(4 * pilot.precise_samples, options_),
-                             .c = pilot.constant()};
+        const ClassPlan plan{.chains = options_.chains, .c = pilot.constant()};
         PathMutations mutations;
         if (!user_paths_.empty()) {
             target.user = {UserPaths::load(scene, user_paths_), user_ratio_ / (1 + user_ratio_)};
             mutations.weights[PathMutations::UserPath] =
                 user_ratio_ * mutations.weights[PathMutations::Bidirectional];
         }
-        return {std::make_unique<PathSpace>(std::move(target), mutations, n), {plan}};
+        // Samples of bidirectional path tracing do not follow user paths. Large steps do.
+        if (target.user.paths)
+            return {std::make_unique<PathSpace>(std::move(target), mutations, n),
+                    {plan},
+                    pool_samples(4 * pilot.precise_samples, options_)};
+        return chains_of_paths(std::make_unique<PathSpace>(std::move(target), mutations, n,
+                                                           samples_of_paths(scene, pilot)),
+                               {plan}, pool_samples(pilot.precise_samples, options_));
     }
 
 private:

@@ -13,6 +13,7 @@
 #include <cmath>
 
 #include "integrator/markov.h"
+#include "math/hash.h"
 #include "mcmc/addresses.h"
 #include "mcmc/technique_choice.h"
 
@@ -40,6 +41,10 @@ public:
         const int s = technique_.choose(k, u_s);
         return {s, k + 1 - s, (has_choice ? longer_.pmf(k) : 1.0) * technique_.pmf(k, s)};
     }
+    int class_of(int k) const { return std::min(k - shortest_, classes_ - 1); }
+    /// The inverse of choose(): numbers that choose C(s, k+1-s), uniformly distributed among these if v is so.
+    double length_number(int k, double v) const { return longer_.number(k, v); }
+    double technique_number(int k, int s, double v) const { return technique_.number(k, s, v); }
     bool has_length_choice(int chain_class) const {
         return chain_class == classes_ - 1 && shortest_ + chain_class < longest_;
     }
@@ -53,10 +58,59 @@ private:
     TechniqueChoice technique_;
 };
 
+/// States of single techniques, which samples of bidirectional path tracing find: the numbers of such a sample are those of
+/// a state for each of its joins, together with numbers that choose the technique.
+class TechniqueSpace final : public PrimarySpace {
+public:
+    TechniqueSpace(int classes, PrimarySample state, WeighedSample samples,
+                   std::shared_ptr<const PathChoice> choice)
+        : PrimarySpace(classes, std::move(state), samples.map), samples_(std::move(samples)),
+          choice_(std::move(choice)) {}
+
+    void sample(uint64_t key, const ChainContext& c, std::vector<Find>& finds) const override {
+        NumberTable numbers;
+        int32_t part = 0;
+        for_each_part(key, c, numbers, [&](const Join& join, double weight) {
+            finds.push_back(
+                {key, part++, choice_->class_of(join.technique.vertices() - 1), weight});
+        });
+    }
+    void recall(const Find& find, const ChainContext& c, ChainState& y) const override {
+        if (find.part == Find::kLargeStep) return draw(find.chain_class, find.key, c, y);
+        NumberTable numbers;
+        int32_t part = 0;
+        int k = 0, s = 0;
+        for_each_part(find.key, c, numbers, [&](const Join& join, double) {
+            if (part++ == find.part) k = join.technique.vertices() - 1, s = join.technique.s;
+        });
+        const auto choose = [&](uint32_t slot, double number) {
+            numbers.set(NumberTable::place(Stream::Selection, addresses::kKind, slot),
+                        uint32_t(std::min(number * 0x1p32, 0x1p32 - 1)));
+        };
+        const uint64_t key = hash_combine(find.key, uint64_t(find.part));
+        choose(0, choice_->length_number(k, to_unit_double(hash_combine(key, 0))));
+        choose(1, choice_->technique_number(k, s, to_unit_double(hash_combine(key, 1))));
+        NumberSource source(NumberStep::Same, key, &numbers, &static_cast<NumberState&>(y).numbers);
+        evaluate(find.chain_class, source, c, y);
+    }
+
+private:
+    template <class Use>
+    void for_each_part(uint64_t key, const ChainContext& c, NumberTable& numbers,
+                       const Use& use) const {
+        NumberSource source(NumberStep::Fresh, key, nullptr, &numbers);
+        Sampler sampler(source);
+        samples_.for_each_part(sampler, c, use);
+    }
+
+    WeighedSample samples_;
+    std::shared_ptr<const PathChoice> choice_;
+};
+
 class MmltIntegrator final : public MarkovIntegrator {
 public:
     explicit MmltIntegrator(const IntegratorParams& p)
-        : MarkovIntegrator(p, DepthOptions::without_roulette(p), {.correlation = 15, .cost = 1}),
+        : MarkovIntegrator(p, DepthOptions::without_roulette(p), {.correlation = 15, .cost = 1.25}),
           lengths_(p.integer("lengths", 1, 64)) {}
 
 protected:
@@ -72,9 +126,10 @@ protected:
             const auto q = choice->choose(k, u_length, c.sampler.next_1d_fine());
             add_technique(c, n, q.s, q.t, float(1 / q.pmf), work);
         };
-        std::vector<ClassPlan> classes_plan = plan(pilot, classes);
-        return {std::make_unique<PrimarySpace>(classes, std::move(sample), pilot.map),
-                std::move(classes_plan)};
+        return chains_of_paths(std::make_unique<TechniqueSpace>(classes, std::move(sample),
+                                                                samples_of_paths(pass.scene, pilot),
+                                                                choice),
+                               plan(pilot, classes), pool_samples(pilot.precise_samples, options_));
     }
 
 private:
@@ -110,8 +165,7 @@ private:
         for (const auto& [technique, value] : pilot.by_technique)
             b[size_t(std::clamp(technique.first - kShortest, 0, classes - 1))] += value;
         for (int i = 0; i < classes; ++i) cost.push_back(double(kShortest + i));
-        return share_out(pilot.constant(), std::move(b), cost,
-                         pool_samples(4 * pilot.precise_samples, options_), options_.chains);
+        return share_out(pilot.constant(), std::move(b), cost, options_.chains);
     }
 
     int lengths_;

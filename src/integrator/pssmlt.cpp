@@ -19,12 +19,11 @@ public:
 protected:
     Chains begin(const PassContext& pass, const Pilot& pilot) override {
         use_roulette(pass.scene.film(), pilot);
-        const ClassPlan plan{.chains = options_.chains,
-                             .pool = pool_samples(pilot.precise_samples, options_),
-                             .c = pilot.constant()};
+        const ClassPlan plan{.chains = options_.chains, .c = pilot.constant()};
         return {
             std::make_unique<PrimarySpace>(1, bidirectional_sample(pass.scene, paths_), pilot.map),
-            {plan}};
+            {plan},
+            pool_samples(pilot.precise_samples, options_)};
     }
 };
 

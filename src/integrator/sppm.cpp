@@ -110,14 +110,15 @@ private:
 };
 
 std::vector<ParamInfo> sppm_params() {
-    return concat({PhotonMapping::params(),
-                   radius_params("Merging radius of the first pass, in scene units; 0: that of a "
-                                 "disc with the area of 36 pixels, as the median pixel sees the "
-                                 "scene, but at most 1 % of the radius of what the camera sees."),
-                   LightPathOptions::params(),
-                   {{"next_event", ParamKind::Bool, "true",
-                     "Whether direct light is computed by shadow rays; otherwise by photons, and "
-                     "at glossy surfaces by chance hits."}}});
+    return concat(
+        {PhotonMapping::params(),
+         radius_params("Merging radius of the first pass, in scene units. 0: automatic, a "
+                       "disc of about 36 pixels at the median depth, but at most 1 % of "
+                       "the radius of what the camera sees."),
+         LightPathOptions::params(),
+         {{"next_event", ParamKind::Bool, "true",
+           "Whether direct light is computed by shadow rays; otherwise by photons, and "
+           "at glossy surfaces by chance hits."}}});
 }
 
 }  // namespace

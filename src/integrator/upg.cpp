@@ -272,10 +272,9 @@ std::vector<ParamInfo> upg_params() {
     return concat(
         {Bidirectional::params(),
          {{"radius", ParamKind::Float, "0",
-           "Largest distance between the vertices of a pair, in scene units; 0: such that an "
-           "eye path finds about eight pairs. upg+bdpt then chooses it from earlier "
-           "passes, for the least product of variance and time, and has a smaller one for vertices "
-           "that the lens does not see directly, by mirrors, or by clear glass."}},
+           "Largest distance between the vertices of a pair, in scene units. 0: automatic, about "
+           "eight pairs for each eye path; upg+bdpt then adapts it during the rendering, and uses "
+           "a smaller one behind the first diffuse or glossy vertex."}},
          LightPathOptions::params(),
          Guiding::params(),
          {{"bound", ParamKind::String, "slab",

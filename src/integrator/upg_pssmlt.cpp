@@ -240,7 +240,7 @@ public:
     explicit UpgPssmltIntegrator(const IntegratorParams& p)
         : MarkovIntegrator(p, DepthOptions::from(p), {.correlation = 10, .cost = 6}), light_(p),
           given_radius_(p.number("radius")) {
-        options_.restarts = true;
+        options_.starts = Starts::EachPass;
         if (!(given_radius_ >= 0))
             throw std::runtime_error(
                 fmt::format("{}: radius must not be negative", p.integrator()));
@@ -288,10 +288,10 @@ protected:
         gathering_.emplace(gathering(pass.scene));
         gathering_->density = density;
 
-        const ClassPlan plan{.chains = options_.chains,
-                             .pool = pool_samples(pilot.precise_samples, options_),
-                             .c = pilot.constant()};
-        return {std::make_unique<GatherSpace>(*gathering_, map_, pilot.map), {plan}};
+        const ClassPlan plan{.chains = options_.chains, .c = pilot.constant()};
+        return {std::make_unique<GatherSpace>(*gathering_, map_, pilot.map),
+                {plan},
+                pool_samples(pilot.precise_samples, options_)};
     }
 
     void advance(const PassContext& pass, const StateSpace& space, ChainGroups& groups) override {

@@ -217,10 +217,10 @@ private:
 std::vector<ParamInfo> vcm_params() {
     return concat(
         {Bidirectional::params(),
-         radius_params("Merging radius of the first pass, in scene units; 0: that of a disc with "
-                       "the area of 36 pixels, as the median pixel sees the scene, but at most 1 % "
-                       "of the radius of what the camera sees. Eye vertices that the film point "
-                       "does not determine merge within 0.3 times this radius."),
+         radius_params("Merging radius of the first pass, in scene units. 0: automatic, a disc of "
+                       "about 36 pixels at the median depth, but at most 1 % of the radius of what "
+                       "the camera sees. Behind the first diffuse or glossy vertex of an eye path, "
+                       "0.3 times this radius is used."),
          LightPathOptions::params(),
          {{"continuation", ParamKind::Float, "0.25",
            "Probability, in (0, 1], with which an eye path continues after its first vertex that "

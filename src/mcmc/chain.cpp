@@ -35,6 +35,7 @@ ChainStats& ChainStats::operator+=(const ChainStats& o) {
         for (size_t k = 0; k < steps[m].size(); ++k) steps[m][k] += o.steps[m][k];
     longest_stay = std::max(longest_stay, o.longest_stay);
     large_steps += o.large_steps;
+    later_samples += o.later_samples;
     large_sum += o.large_sum;
     chain_light += o.chain_light, large_light += o.large_light;
     return *this;
@@ -43,8 +44,8 @@ ChainStats& ChainStats::operator+=(const ChainStats& o) {
 Chain::Chain(const StateSpace& space, int chain_class)
     : space_(space), class_(chain_class), x_(space.make_state()), y_(space.make_state()) {}
 
-void Chain::start(uint64_t key, const ChainContext& c) {
-    space_.draw(class_, key, c, *x_);
+void Chain::start(const Find& find, const ChainContext& c) {
+    space_.recall(find, c, *x_);
     is_started_ = x_->target > 0;
     stay_ = 0;
 }
@@ -77,6 +78,15 @@ void StateSpace::contribute(int chain_class, const ChainState& x, double factor,
     for (const Splat& s : x.splats) film.add(s.film, s.value * float(factor));
 }
 
+void StateSpace::sample(uint64_t key, const ChainContext& c, std::vector<Find>& finds) const {
+    const auto state = make_state();
+    for (int k = 0; k < classes(); ++k) {
+        const uint64_t own = k == 0 ? key : hash_combine(key, uint64_t(k));
+        draw(k, own, c, *state);
+        if (state->target > 0) finds.push_back({own, 0, k, state->target});
+    }
+}
+
 Proposal Chain::propose(bool is_large, uint64_t key, const ChainContext& c) {
     if (!is_large) return space_.propose(class_, *x_, key, c, *y_);
     space_.draw(class_, key, c, *y_);
@@ -91,8 +101,9 @@ double Chain::acceptance(const Proposal& proposal, RenderStats& stats) const {
     return std::isnan(a) ? 0.0 : std::min(1.0, a);
 }
 
-void Chain::advance(const ChainTerms& terms, double b, double scale, uint64_t key, uint64_t first,
-                    uint64_t count, const ChainContext& c, StateSink& states, ChainStats& stats) {
+void Chain::advance(const ChainTerms& terms, double b, double scale, uint64_t key, uint64_t count,
+                    const ChainContext& c, StateSink& states, ChainStats& stats,
+                    std::vector<Find>* finds) {
     /// What a state is worth: the sum of its factors b·a, and 1 if it comes from a large step.
     struct Shares {
         double chain = 0, large = 0;
@@ -106,11 +117,12 @@ void Chain::advance(const ChainTerms& terms, double b, double scale, uint64_t ke
         if (factor != 0) states.add(state, factor);
     };
     Shares of_x;  // Not yet added.
-    for (uint64_t step = first; step < first + count; ++step) {
+    for (uint64_t step = 0; step < count; ++step) {
         const uint64_t step_key = hash_combine(key, step);
         const bool is_large = to_unit_double(hash_combine(step_key, 0)) < terms.p_large;
         if (!is_large && !is_started_) continue;
-        const Proposal proposal = propose(is_large, hash_combine(step_key, 1), c);
+        const uint64_t proposal_key = hash_combine(step_key, 1);
+        const Proposal proposal = propose(is_large, proposal_key, c);
         const double a = acceptance(proposal, c.work.stats);
 
         StepCounts& counts = is_large
@@ -120,7 +132,11 @@ void Chain::advance(const ChainTerms& terms, double b, double scale, uint64_t ke
         counts.failed += proposal.has_failed;
         counts.zero += !proposal.has_failed && !(y_->target > 0);
         counts.accepted += a;
-        if (is_large) ++stats.large_steps, stats.large_sum += y_->target;
+        if (is_large) {
+            ++stats.large_steps, stats.large_sum += y_->target;
+            if (finds && y_->target > 0)
+                finds->push_back({proposal_key, Find::kLargeStep, class_, y_->target});
+        }
 
         const Shares of_y{b * a, is_large ? 1.0 : 0.0};
         if (is_started_) of_x.chain += b * (1 - a);

@@ -35,6 +35,7 @@ struct ChainStats {
     std::array<std::array<StepCounts, kLengths>, kMutations> steps{};
     uint64_t longest_stay = 0;  ///< Largest number of successive steps without an accepted one.
     uint64_t large_steps = 0;
+    uint64_t later_samples = 0;               ///< See chain_groups.h.
     double large_sum = 0;                     ///< Sum of I over large steps.
     double chain_light = 0, large_light = 0;  ///< Σ I·factor, of the two parts of the estimator.
 
@@ -53,14 +54,13 @@ public:
     Chain(const StateSpace& space, int chain_class);
 
     void start_black() { is_started_ = false; }
-    /// Starts at the independent state that `key` determines.
-    void start(uint64_t key, const ChainContext& c);
+    void start(const Find& find, const ChainContext& c);
     void copy(const Chain& from);
 
-    /// Makes steps first … first+count-1, whose random numbers are functions of `key` and the number of the step. Adds the
-    /// states with the factors given above, times `scale`.
-    void advance(const ChainTerms& terms, double b, double scale, uint64_t key, uint64_t first,
-                 uint64_t count, const ChainContext& c, StateSink& states, ChainStats& stats);
+    /// Makes `count` steps, whose random numbers are functions of `key` and the number of the step. Adds the states with the factors given above, times `scale`. Adds what large steps have found to `finds`, if it is given.
+    void advance(const ChainTerms& terms, double b, double scale, uint64_t key, uint64_t count,
+                 const ChainContext& c, StateSink& states, ChainStats& stats,
+                 std::vector<Find>* finds = nullptr);
 
     void save(LearnedState& to) const;
     void load(LearnedState& from);

@@ -1,8 +1,8 @@
 #include "mcmc/chain_groups.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <numeric>
 #include <stdexcept>
 
 #include "math/hash.h"
@@ -13,7 +13,15 @@ namespace etendue {
 namespace {
 
 /// Purposes of the random numbers of a group.
-enum Purpose : uint64_t { kPool, kResampling, kSteps };
+enum Purpose : uint64_t { kPool, kResampling, kSteps, kThinning, kLater };
+
+/// Finds that are kept for each chain.
+constexpr size_t kFindsOfChain = 16;
+
+/// Generations start before the turns 0, 1, 4, 16 …
+bool begins_generation(uint32_t turn) {
+    return turn == 0 || (std::has_single_bit(turn) && std::countr_zero(turn) % 2 == 0);
+}
 
 class StatesToFilm final : public StateSink {
 public:
@@ -32,27 +40,9 @@ private:
 
 }  // namespace
 
-std::vector<size_t> resample(std::span<const double> weights, size_t count, double u) {
-    const double total = std::accumulate(weights.begin(), weights.end(), 0.0);
-    std::vector<size_t> out;
-    if (!(total > 0)) return out;
-    size_t item = 0;
-    double sum = weights[0];
-    for (size_t i = 0; i < count; ++i) {
-        const double at = (double(i) + u) / double(count) * total;
-        while (sum <= at && item + 1 < weights.size()) sum += weights[++item];
-        // By rounding, the last item may be one without weight.
-        size_t chosen = item;
-        while (!(weights[chosen] > 0)) --chosen;
-        out.push_back(chosen);
-    }
-    return out;
-}
-
 std::vector<ClassPlan> share_out(double b, std::vector<double> b_of_class,
-                                 std::span<const double> cost, uint64_t pool, int chains) {
+                                 std::span<const double> cost, int chains) {
     constexpr int kFewest = 4;
-    constexpr uint64_t kSmallestPool = 64;
     constexpr double kLeast = 0.25;
     const int classes = int(b_of_class.size());
     double total = 0;
@@ -69,10 +59,7 @@ std::vector<ClassPlan> share_out(double b, std::vector<double> b_of_class,
         sum += shares[k] / total;
         const int upto = int(std::lround(sum * spare)), of_class = kFewest + upto - given;
         given = upto;
-        plan.push_back(
-            {.chains = of_class,
-             .pool = std::max(kSmallestPool, pool * uint64_t(of_class) / uint64_t(chains)),
-             .c = b_of_class[k]});
+        plan.push_back({.chains = of_class, .c = b_of_class[k]});
     }
     return plan;
 }
@@ -85,32 +72,70 @@ ChainGroups::ChainGroups(const StateSpace& space, const ChainOptions& options,
     for (const int k : class_of_chain_) working_.chains.emplace_back(space_, k);
 }
 
+void ChainGroups::Normalisation::pool_all() {
+    pool_sum += later_sum, pool += later;
+    later_sum = later = 0;
+}
+
+void ChainGroups::sample(const PassContext& pass, uint64_t key, uint64_t count,
+                         Group& group) const {
+    constexpr uint64_t kChunk = 64, kChunks = 4096;
+    constexpr size_t kMost = 16;  // finds of a class that a chunk keeps
+    struct Chunk {
+        std::vector<std::vector<Find>> finds;
+        std::vector<double> sums;
+    };
+    std::vector<Chunk> chunks;
+    for (uint64_t first = 0; first < count; first += kChunk * kChunks) {
+        const uint64_t end = std::min(count, first + kChunk * kChunks);
+        chunks.assign((end - first + kChunk - 1) / kChunk, {});
+        pass.for_each_other_path(chunks.size(), [&](uint64_t i, Sampler&, Workspace& work) {
+            const WholeFilm whole(pass);
+            Chunk& chunk = chunks[i];
+            chunk.finds.resize(plan_.size());
+            chunk.sums.resize(plan_.size());
+            std::vector<Find> found;
+            const uint64_t begin = first + i * kChunk;
+            for (uint64_t at = begin; at < std::min(end, begin + kChunk); ++at)
+                space_.sample(hash_combine(key, at), {whole.sample, work}, found);
+            for (const Find& f : found) {
+                chunk.finds[size_t(f.chain_class)].push_back(f);
+                chunk.sums[size_t(f.chain_class)] += f.weight;
+            }
+            const double u = to_unit_double(hash_combine(hash_combine(key, kThinning), begin));
+            for (auto& finds : chunk.finds) thin(finds, kMost, u);
+        });
+        for (size_t k = 0; k < plan_.size(); ++k)
+            for (const Chunk& chunk : chunks) {
+                group.finds[k].insert(group.finds[k].end(), chunk.finds[k].begin(),
+                                      chunk.finds[k].end());
+                group.normalisation[k].later_sum += chunk.sums[k];
+            }
+        thin_finds(hash_combine(key, end), group);
+    }
+    for (Normalisation& n : group.normalisation) n.later += double(count);
+}
+
+void ChainGroups::thin_finds(uint64_t key, Group& group) const {
+    for (size_t k = 0; k < plan_.size(); ++k)
+        thin(group.finds[k], kFindsOfChain * size_t(plan_[k].chains),
+             to_unit_double(hash_combine(hash_combine(key, kThinning), k)));
+}
+
 void ChainGroups::start(const PassContext& pass, uint64_t key, Group& group) const {
-    group.normalisation.assign(plan_.size(), {});
-    group.steps = 0;
     size_t first = 0;
     for (size_t k = 0; k < plan_.size(); ++k) {
-        const ClassPlan& plan = plan_[k];
-        const uint64_t pool_key = hash_combine(hash_combine(key, kPool), k);
-        std::vector<double> importance(plan.pool);
-        pass.for_each_other_path(plan.pool, [&](uint64_t i, Sampler&, Workspace& work) {
-            const WholeFilm whole(pass);
-            const auto state = space_.make_state();
-            space_.draw(int(k), hash_combine(pool_key, i), {whole.sample, work}, *state);
-            importance[i] = state->target;
-        });
-        Normalisation& n = group.normalisation[k];
-        n.pool = plan.pool;
-        for (const double v : importance) n.pool_sum += v;
-
+        const int count = plan_[k].chains;
+        const std::vector<Find>& finds = group.finds[k];
+        group.normalisation[k].pool_all();
         const double u = to_unit_double(hash_combine(hash_combine(key, kResampling), k));
-        const std::vector<size_t> seeds = resample(importance, size_t(plan.chains), u);
-        for (int i = 0; i < plan.chains; ++i) group.chains[first + size_t(i)].start_black();
+        const std::vector<size_t> seeds = resample(finds, size_t(count), u);
+        for (int i = 0; i < count; ++i) group.chains[first + size_t(i)].start_black();
         pass.for_each_other_path(seeds.size(), [&](uint64_t i, Sampler&, Workspace& work) {
             const WholeFilm whole(pass);
-            group.chains[first + i].start(hash_combine(pool_key, seeds[i]), {whole.sample, work});
+            group.chains[first + i].start(finds[seeds[i]], {whole.sample, work});
         });
-        first += size_t(plan.chains);
+        first += size_t(count);
     }
 }
 
@@ -118,7 +143,7 @@ double ChainGroups::scale(size_t g, const Group& group, int chain_class) const {
     const size_t k = size_t(chain_class);
     double shift = 0;
     for (size_t h = 0; h < groups_.size(); ++h) {
-        if (h == g || groups_[h].normalisation.empty()) continue;
+        if (h == g || !groups_[h].has_begun()) continue;
         const Normalisation& n = groups_[h].normalisation[k];
         shift += (n.later_b() - n.b()) / double(groups_.size() - 1);
     }
@@ -133,17 +158,23 @@ void ChainGroups::advance(const PassContext& pass) {
 
 void ChainGroups::advance(const PassContext& pass, const MakeSink& make_sink) {
     const size_t g = pass.index % groups_.size();
-    const uint64_t key = hash_combine(hash_combine(pass.seed, 0x636861696e),
-                                      options_.restarts ? pass.index : uint64_t(g));
+    const bool starts_each_pass = options_.starts == Starts::EachPass;
     working_group_ = g;
-    if (options_.restarts || groups_[g].chains.empty()) {
-        start(pass, key, working_);
+    const bool is_new = starts_each_pass || !groups_[g].has_begun();
+    working_.turns = groups_[g].turns;
+    if (is_new) {
+        working_.normalisation.assign(plan_.size(), {});
+        working_.finds.assign(plan_.size(), {});
     } else {
         for (size_t i = 0; i < working_.chains.size(); ++i)
             working_.chains[i].copy(groups_[g].chains[i]);
         working_.normalisation = groups_[g].normalisation;
-        working_.steps = groups_[g].steps;
+        working_.finds = groups_[g].finds;
     }
+    const bool starts =
+        is_new || (options_.starts == Starts::ByGeneration && begins_generation(working_.turns));
+    const uint64_t key = hash_combine(
+        hash_combine(hash_combine(pass.seed, 0x636861696e), uint64_t(g)), working_.turns);
 
     // Made before the pass, so that nothing can fail once it is finished.
     if (groups_[g].chains.empty())
@@ -153,9 +184,18 @@ void ChainGroups::advance(const PassContext& pass, const MakeSink& make_sink) {
     const size_t chains = working_.chains.size();
     const uint64_t steps =
         uint64_t(std::ceil(options_.mutations * double(pass.pixels) / double(chains)));
+    if (is_new) sample(pass, hash_combine(key, kPool), options_.pool, working_);
+    const auto later = options_.starts == Starts::ByGeneration
+                           ? uint64_t(std::ceil(options_.later * double(steps * chains)))
+                           : 0;
+    sample(pass, hash_combine(key, kLater), later, working_);
+    if (starts) start(pass, key, working_);
+
     std::vector<double> scales;
     for (size_t k = 0; k < plan_.size(); ++k) scales.push_back(scale(g, working_, int(k)));
     std::vector<ChainStats> stats(chains);
+    const bool keeps_finds = options_.starts == Starts::ByGeneration;
+    std::vector<std::vector<Find>> finds(chains);
     pass.for_each_chain(chains, [&](uint64_t i, SplatSink& splats, Workspace& work) {
         const WholeFilm whole(pass);
         const size_t k = size_t(class_of_chain_[i]);
@@ -164,11 +204,12 @@ void ChainGroups::advance(const PassContext& pass, const MakeSink& make_sink) {
         const auto states = make_sink(i, class_of_chain_[i], c, splats);
         working_.chains[i].advance({options_.p_large, plan_[k].c}, scales[k],
                                    mean * double(pass.light_paths),
-                                   hash_combine(hash_combine(key, kSteps), i), working_.steps,
-                                   steps, c, *states, stats[i]);
+                                   hash_combine(hash_combine(key, kSteps), i), steps, c, *states,
+                                   stats[i], keeps_finds ? &finds[i] : nullptr);
     });
 
     working_stats_ = {};
+    working_stats_.later_samples = later;
     double own = 0, all = 0;
     for (size_t i = 0; i < chains; ++i) {
         const size_t k = size_t(class_of_chain_[i]);
@@ -184,10 +225,18 @@ void ChainGroups::advance(const PassContext& pass, const MakeSink& make_sink) {
     own_scale_ = all > 0 ? own / all : 1.0;
     for (size_t i = 0; i < chains; ++i) {
         Normalisation& n = working_.normalisation[size_t(class_of_chain_[i])];
-        n.large_sum += stats[i].large_sum;
-        n.large += stats[i].large_steps;
+        n.later_sum += options_.large_step * stats[i].large_sum;
+        n.later += options_.large_step * double(stats[i].large_steps);
+        for (Find& f : finds[i]) {
+            f.weight *= options_.large_step;
+            working_.finds[size_t(class_of_chain_[i])].push_back(f);
+        }
     }
-    working_.steps += steps;
+    if (keeps_finds)
+        thin_finds(key, working_);
+    else
+        working_.finds.clear();
+    ++working_.turns;
 }
 
 void ChainGroups::commit() noexcept {
@@ -195,16 +244,19 @@ void ChainGroups::commit() noexcept {
     if (group.chains.empty()) group.chains.swap(spare_);
     group.chains.swap(working_.chains);
     group.normalisation.swap(working_.normalisation);
-    group.steps = working_.steps;
+    group.finds.swap(working_.finds);
+    group.turns = working_.turns;
     stats_ += working_stats_;
 }
 
 void ChainGroups::save(LearnedState& to) const {
     for (const Group& g : groups_) {
-        const size_t kept = options_.restarts ? 0 : g.chains.size();
+        const size_t kept = options_.starts == Starts::EachPass ? 0 : g.chains.size();
         to.put(uint64_t(kept));
         to.put(g.normalisation);
-        to.put(g.steps);
+        to.put(g.turns);
+        to.put(uint64_t(g.finds.size()));
+        for (const auto& finds : g.finds) to.put(finds);
         for (size_t i = 0; i < kept; ++i) g.chains[i].save(to);
     }
     to.put(stats_);
@@ -216,7 +268,13 @@ void ChainGroups::load(LearnedState& from) {
         uint64_t chains = 0;
         from.get(chains);
         from.get(g.normalisation);
-        from.get(g.steps);
+        from.get(g.turns);
+        uint64_t classes = 0;
+        from.get(classes);
+        if (classes > plan_.size())
+            throw std::runtime_error("the learned state is of another number of classes");
+        g.finds.resize(size_t(classes));
+        for (auto& finds : g.finds) from.get(finds);
         if (chains != 0 && chains != class_of_chain_.size())
             throw std::runtime_error("the learned state is of another number of chains");
         g.chains.clear();
@@ -236,14 +294,14 @@ double ChainGroups::later_b(const Group& group) const {
 double ChainGroups::b() const {
     Moments m;
     for (const Group& g : groups_)
-        if (!g.normalisation.empty()) m.add(later_b(g));
+        if (g.has_begun()) m.add(later_b(g));
     return m.mean();
 }
 
 double ChainGroups::relative_error_of_b() const {
     Moments m;
     for (const Group& g : groups_)
-        if (!g.normalisation.empty()) m.add(later_b(g));
+        if (g.has_begun()) m.add(later_b(g));
     return m.count() > 1 && m.mean() > 0 ? std::sqrt(m.squared_error()) / m.mean() : 0.0;
 }
 

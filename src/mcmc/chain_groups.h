@@ -4,12 +4,20 @@
 // A group starts with a pool of independent samples. The mean importance b_g of the pool is its normalisation, and its
 // chains start at states of the pool, resampled in proportion to importance. Then E[b_g h(x)] = ∫ I h for any size of the
 // pool and after any number of steps that leave I invariant, so there is no start-up bias [Veach 1997, §11.3.1]. This
-// requires b_g to come from the same pool. Later large steps improve the estimate of b through the other groups: a pass of
-// g is scaled by b_g plus the mean of b'_h - b_h over all other groups h, where b'_h is the mean over the pool of h and all
-// large steps of its earlier passes. This mean has the expectation 0 and is independent of g. Averaged over all groups, the
-// scale is the mean of b'.
+// requires b_g to come from the same pool. Later samples and large steps improve the estimate of b through the other groups:
+// a pass of g is scaled by b_g plus the mean of b'_h - b_h over all other groups h, where b'_h is the mean over the pool of h
+// and all later samples and large steps of h. This mean has the expectation 0 and is independent of g. Averaged over all
+// groups, the scale is the mean of b'.
 //
-// If each pass has a target of its own, with random parameters (ChainOptions::restarts), its group starts anew in each pass.
+// By generations, a group starts anew before its turns 0, 1, 4, 16 …, from everything that it has found so far: pool, later
+// samples and large steps together are a larger pool. They are independent samples whose number does not depend on what they
+// found, so that the above holds in each generation. Rare light then has its share of the chains by all finds, and not by
+// those of the first pool, which chains may take longer to forget than the rendering takes. Nothing that the steps depend on
+// may be learned from the finds. Groups use their own finds only, and remain independent of each other; since b_g h(x) is
+// linear in the finds, the mean over the groups is that of one pool of all their finds. A large step counts as a given
+// fraction of a sample in these means.
+//
+// If each pass has a target of its own, with random parameters (Starts::EachPass), its group starts anew in each pass.
 // The estimates of b above then have the same expectation over these parameters for all groups.
 
 #include <functional>
@@ -18,27 +26,35 @@
 
 namespace etendue {
 
+/// When the chains of a group start anew.
+enum class Starts : uint8_t {
+    Once,
+    ByGeneration,
+    EachPass,  ///< Because its target differs from that of earlier passes.
+};
+
 struct ChainOptions {
     int groups = 16;
     int chains = 256;  ///< Number in a group, for all classes together.
     double p_large = 0.3;
     double mutations = 1;  ///< Steps per pixel and pass, for all chains of a group together.
-    /// Whether each pass starts its group anew, because its target differs from that of earlier passes.
-    bool restarts = false;
+    Starts starts = Starts::ByGeneration;
+    uint64_t pool = 1024;   ///< Number of samples in the first pool of a group.
+    double later = 0;       ///< Later samples for each mutation.
+    double large_step = 1;  ///< What a large step counts in pools, relative to a sample.
 };
 
 /// Parameters of a class that are fixed before its chains start.
 struct ClassPlan {
     int chains = 0;
-    uint64_t pool = 0;  ///< Number of samples in the pool.
-    double c = 0;       ///< See chain.h.
+    double c = 0;  ///< See chain.h.
 };
 
 /// Plans for classes, of which a pilot found the parts `b_of_class` of b, and of which steps have these costs. Chains are
 /// shared out in proportion to b_k/√cost. A class of which the pilot found little counts as a quarter of the mean: its
 /// large steps may yet find light, which a constant c of zero would leave to chains that may never start.
 std::vector<ClassPlan> share_out(double b, std::vector<double> b_of_class,
-                                 std::span<const double> cost, uint64_t pool, int chains);
+                                 std::span<const double> cost, int chains);
 
 class ChainGroups {
 public:
@@ -66,20 +82,28 @@ public:
     double own_scale() const { return own_scale_; }
 
 private:
+    /// Sums over the pool, and over what has come later.
     struct Normalisation {
-        double pool_sum = 0, large_sum = 0;
-        uint64_t pool = 0, large = 0;
-        double b() const { return pool > 0 ? pool_sum / double(pool) : 0.0; }
-        double later_b() const {
-            return pool > 0 ? (pool_sum + large_sum) / double(pool + large) : 0.0;
-        }
+        double pool_sum = 0, later_sum = 0;
+        double pool = 0, later = 0;  ///< Numbers of samples.
+        double b() const { return pool > 0 ? pool_sum / pool : 0.0; }
+        double later_b() const { return pool > 0 ? (pool_sum + later_sum) / (pool + later) : 0.0; }
+        /// Makes what has come later a part of the pool.
+        void pool_all();
     };
     struct Group {
-        std::vector<Chain> chains;  ///< By class.
-        std::vector<Normalisation> normalisation;
-        uint64_t steps = 0;  ///< Number of steps that each chain has made.
+        std::vector<Chain> chains;                 ///< By class.
+        std::vector<Normalisation> normalisation;  ///< By class, like `finds`.
+        /// Of all samples and large steps, thinned out.
+        std::vector<std::vector<Find>> finds;
+        uint32_t turns = 0;  ///< Number of passes.
+
+        bool has_begun() const { return turns > 0; }
     };
 
+    /// Draws samples, as later ones of the pool.
+    void sample(const PassContext& pass, uint64_t key, uint64_t count, Group& group) const;
+    void thin_finds(uint64_t key, Group& group) const;
     void start(const PassContext& pass, uint64_t key, Group& group) const;
     /// Scale of a pass of group g; `group` is its state, since it may have started in this pass.
     double scale(size_t g, const Group& group, int chain_class) const;
@@ -96,8 +120,5 @@ private:
     ChainStats working_stats_, stats_;
     double own_scale_ = 1;
 };
-
-/// Draws `count` indices of weighted items by systematic resampling: item i occurs count·w_i/Σw times on average.
-std::vector<size_t> resample(std::span<const double> weights, size_t count, double u);
 
 }  // namespace etendue

@@ -127,6 +127,21 @@ bool PathBuilder::sample(int from_light, int from_eye) {
     return sample_light(from_light) && sample_eye(from_eye);
 }
 
+void PathBuilder::take(const Join& join, const Flight& flight) {
+    const int s = join.technique.s, t = join.technique.t;
+    SubPath &y = work_.y, &z = work_.z;
+    light_end_ = s == 0 ? LightEnd::Hit : s == 1 ? LightEnd::NextEvent : LightEnd::Sampled;
+    eye_end_ = t == 0 ? EyeEnd::Hit : t == 1 ? EyeEnd::Connected : EyeEnd::Sampled;
+    y.truncate(s >= 2 ? s - (t == 0) : 0);
+    z.truncate(t >= 2 ? t : 0);
+    y.flight = flight;
+    film_ = join.film;
+    // As join_next_event() and join_splat() read them.
+    emitter_numbers_ = uint64_t(t) - 1;
+    lens_numbers_ = uint64_t(s) + 0x8000u;
+    escaped_to_ = join.emitter;
+}
+
 bool PathBuilder::sample_eye_path(int count) {
     eye_end_ = count == 1 ? EyeEnd::Connected : EyeEnd::Sampled;
     return sample_eye(count);
@@ -205,7 +220,7 @@ bool PathBuilder::append_emitter_point(const Vertex& from, PathState& y) {
     const Scene& scene = measure_.scene;
     if (!scene.has_emitters() || !from.is_connectible || from.kind == Vertex::Kind::Sensor)
         return false;
-    sampler_.seek(Stream::Connection, 0);
+    sampler_.seek(Stream::Connection, emitter_numbers_);
     const Emitter& emitter =
         scene.sample_emitter(sampler_.next_1d_fine_if(scene.has_emitter_choice()));
     DirectSample d;
@@ -226,9 +241,11 @@ bool PathBuilder::append_emitter_point(const Vertex& from, PathState& y) {
 bool PathBuilder::append_hit_emitter(const Vertex& hit, PathState& y) {
     const auto& infinite = measure_.scene.infinite_emitters();
     const Emitter* emitter = hit.emitter;
-    if (hit.is_infinite) {
+    if (hit.is_infinite && escaped_to_) {
+        emitter = escaped_to_;
+    } else if (hit.is_infinite) {
         if (infinite.empty()) return false;
-        sampler_.seek(Stream::Connection, 0);
+        sampler_.seek(Stream::Connection, emitter_numbers_);
         const auto i = size_t(sampler_.next_1d() * float(infinite.size()));
         emitter = infinite[std::min(i, infinite.size() - 1)];
     }
@@ -256,7 +273,7 @@ bool PathBuilder::append_lens(const Vertex& from, PathState& y) {
         y.film = at->film;
         return true;
     }
-    sampler_.seek(Stream::Connection, 1);
+    sampler_.seek(Stream::Connection, lens_numbers_);
     const auto at = sensor.sample_connection(from.p, from.is_infinite, sampler_.next_2d());
     if (!at) return false;
     Vertex v;

@@ -3,6 +3,7 @@
 
 #include "mcmc/path_state.h"
 #include "mcmc/user_paths.h"
+#include "pathspace/join.h"
 
 namespace etendue {
 
@@ -34,6 +35,10 @@ public:
     bool sample(int from_light, int from_eye);
     /// The same for the eye's side alone, where it keeps no vertex; `count` is at least 1.
     bool sample_eye_path(int count);
+
+    /// Takes the sub-paths that `work` now has, and their join, as a sample of bidirectional path tracing with the same random
+    /// numbers made it. `flight` is that of the light sub-path when it was joined.
+    void take(const Join& join, const Flight& flight);
 
     /// Starts the eye sub-path at the kept lens point, through a film point in pixels, and walks to its first surface.
     bool start_eye(Vec2 film);
@@ -82,6 +87,10 @@ private:
     int new_light_ = 0, new_eye_ = 0;  ///< Vertices sampled so far.
     WalkContext walk_;
     Vec2 film_{};
+    /// Vertices of Stream::Connection: the numbers for an emitter or a point on it, and for a lens point.
+    uint64_t emitter_numbers_ = 0, lens_numbers_ = 1;
+    const Emitter* escaped_to_ =
+        nullptr;  ///< The emitter at infinity of an eye path that left the scene, if it is known.
 };
 
 }  // namespace etendue

@@ -32,8 +32,10 @@ void expect_announced(const PathState& x, const PathState& y, const MutationWay&
 
 }  // namespace
 
-PathSpace::PathSpace(PathTarget target, const PathMutations& mutations, TechniqueCounts counts)
-    : target_(std::move(target)), options_(mutations), counts_(counts) {
+PathSpace::PathSpace(PathTarget target, const PathMutations& mutations, TechniqueCounts counts,
+                     std::optional<WeighedSample> samples)
+    : target_(std::move(target)), options_(mutations), samples_(std::move(samples)),
+      counts_(counts) {
     const PathMeasure& measure = target_.measure;
     using EyeChain = EyeChainMutation;
     mutations_[PathMutations::Bidirectional] = std::make_unique<BidirectionalMutation>(measure);
@@ -72,6 +74,38 @@ void PathSpace::draw(int, uint64_t key, const ChainContext& c, ChainState& state
     const int s = target_.techniques.choose(k, u_technique);
     y.edges = k;
     if (builder.sample(s, k + 1 - s) && builder.finish(y)) y.finish(c.work.stats);
+}
+
+void PathSpace::sample(uint64_t key, const ChainContext& c, std::vector<Find>& finds) const {
+    if (!samples_) return StateSpace::sample(key, c, finds);
+    Sampler sampler(SamplerKind::Independent, key);
+    sampler.start(0, 0);
+    int32_t part = 0;
+    samples_->for_each_part(sampler, c, [&](const Join&, double weight) {
+        finds.push_back({key, part++, 0, weight});
+    });
+}
+
+void PathSpace::recall(const Find& find, const ChainContext& c, ChainState& state) const {
+    if (!samples_ || find.part == Find::kLargeStep)
+        return draw(find.chain_class, find.key, c, state);
+    auto& y = static_cast<PathState&>(state);
+    Sampler sampler(SamplerKind::Independent, find.key);
+    sampler.start(0, 0);
+    const MutationContext context{target_.measure, c, sampler};
+    PathBuilder builder = context.builder(nullptr, -1, 0);
+    std::optional<Join> join;
+    Flight flight;
+    int32_t part = 0;
+    samples_->for_each_part(sampler, c, [&](const Join& j, double) {
+        if (part++ != find.part) return;
+        join = j;
+        flight = c.work.y.flight;
+    });
+    y.set_black();
+    if (!join) return;
+    builder.take(*join, flight);
+    if (builder.finish(y)) y.finish(c.work.stats);
 }
 
 bool PathSpace::draw_user_path(PathBuilder& builder, Sampler& sampler) const {

@@ -3,6 +3,7 @@
 // change a part of it.
 
 #include "mcmc/mutation/mutation.h"
+#include "mcmc/weighed_sample.h"
 
 namespace etendue {
 
@@ -29,7 +30,10 @@ struct PathMutations {
 
 class PathSpace final : public StateSpace {
 public:
-    PathSpace(PathTarget target, const PathMutations& mutations, TechniqueCounts counts);
+    /// `samples` are those of bidirectional path tracing, in which chains find their first states; if it is not given, they
+    /// find them in large steps.
+    PathSpace(PathTarget target, const PathMutations& mutations, TechniqueCounts counts,
+              std::optional<WeighedSample> samples = {});
 
     std::span<const char* const> mutations() const override { return PathMutations::kNames; }
     std::unique_ptr<ChainState> make_state() const override {
@@ -41,6 +45,8 @@ public:
     void draw(int chain_class, uint64_t key, const ChainContext& c, ChainState& y) const override;
     Proposal propose(int chain_class, const ChainState& x, uint64_t key, const ChainContext& c,
                      ChainState& y) const override;
+    void sample(uint64_t key, const ChainContext& c, std::vector<Find>& finds) const override;
+    void recall(const Find& find, const ChainContext& c, ChainState& y) const override;
     void repeat(int chain_class, const ChainState& x, const ChainContext& c,
                 ContributionSink& sink) const override;
 
@@ -57,6 +63,7 @@ private:
     PathTarget target_;
     PathMutations options_;
     std::array<std::unique_ptr<PathMutation>, PathMutations::kCount> mutations_;
+    std::optional<WeighedSample> samples_;
     TechniqueCounts counts_;  ///< For the MIS weights of the joins that repeat() reports.
 };
 

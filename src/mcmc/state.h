@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "mcmc/finds.h"
 #include "pathspace/learned_state.h"
 #include "pathspace/sample_context.h"
 
@@ -65,6 +66,13 @@ public:
                       ChainState& y) const = 0;
     virtual Proposal propose(int chain_class, const ChainState& x, uint64_t key,
                              const ChainContext& c, ChainState& y) const = 0;
+    /// Draws an independent sample and adds the states of all classes of which it consists; by default one of draw() for
+    /// each class.
+    virtual void sample(uint64_t key, const ChainContext& c, std::vector<Find>& finds) const;
+    /// Sets y to a state that was found, by a sample or as a large step.
+    virtual void recall(const Find& find, const ChainContext& c, ChainState& y) const {
+        draw(find.chain_class, find.key, c, y);
+    }
     /// Reports the contributions of x to `sink` again, with its sub-paths in c.work.
     virtual void repeat(int chain_class, const ChainState& x, const ChainContext& c,
                         ContributionSink& sink) const = 0;

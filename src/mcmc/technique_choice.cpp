@@ -18,6 +18,12 @@ int pick(const std::vector<double>& shares, double u) {
     return chosen;
 }
 
+double sum_before(const std::vector<double>& shares, size_t end) {
+    double sum = 0;
+    for (size_t i = 0; i < end; ++i) sum += shares[i];
+    return sum;
+}
+
 }  // namespace
 
 bool hits_emitters(const Scene& scene) {
@@ -57,6 +63,12 @@ int TechniqueChoice::choose(int k, double u) const {
     if (row < pmf_.size()) return pick(pmf_[row], u);
     const int i = std::min(int(u * allowed(k)), allowed(k) - 1);
     return hits_ ? i : i + 1;
+}
+
+double TechniqueChoice::number(int k, int s, double v) const {
+    const size_t row = size_t(k - shortest_);
+    if (row < pmf_.size()) return sum_before(pmf_[row], size_t(s)) + v * pmf_[row][size_t(s)];
+    return (double(hits_ ? s : s - 1) + v) / double(allowed(k));
 }
 
 LengthChoice::LengthChoice(int shortest, int longest, const TechniqueLight& light)
@@ -117,6 +129,16 @@ int LengthChoice::choose(double u) const {
     const double most = longest_ - shortest_;
     const double v = (u - by_energy_) / (1 - by_energy_) * (1 - std::pow(ratio_, most + 1));
     return shortest_ + int(std::min(most, std::log1p(-v) / std::log(ratio_)));
+}
+
+double LengthChoice::number(int k, double v) const {
+    const size_t i = size_t(k - shortest_);
+    const double tabulated = by_energy_ * (i < energy_.size() ? energy_[i] : 0.0);
+    const double of_part = v * computed_pmf(k);
+    if (of_part < tabulated) return by_energy_ * sum_before(energy_, i) + of_part;
+    const double lengths = double(longest_ - shortest_) + 1;
+    const double shorter = (1 - std::pow(ratio_, double(i))) / (1 - std::pow(ratio_, lengths));
+    return by_energy_ + (1 - by_energy_) * shorter + (of_part - tabulated);
 }
 
 }  // namespace etendue

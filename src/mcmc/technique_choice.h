@@ -24,6 +24,8 @@ public:
     TechniqueChoice(const Scene& scene, int shortest, int lengths, const TechniqueLight& light);
     double pmf(int k, int s) const;
     int choose(int k, double u) const;
+    /// The inverse of choose(): a number that chooses s, uniformly distributed among these if v is so in [0, 1).
+    double number(int k, int s, double v) const;
 
 private:
     bool is_allowed(int k, int s) const { return s == 0 ? hits_ : s == k + 1 ? hits_lens_ : true; }
@@ -42,6 +44,8 @@ public:
     LengthChoice(int shortest, int longest, const TechniqueLight& light);
     double pmf(int k) const;
     int choose(double u) const;
+    /// The inverse of choose(), as that of TechniqueChoice.
+    double number(int k, double v) const;
 
 private:
     void fit_ratio();

@@ -10,6 +10,7 @@
 #include "description/fingerprint.h"
 #include "geometry/ray_tracer.h"
 #include "math/content_hash.h"
+#include "render/method_choice.h"
 #include "render/render_request.h"
 #include "render/statistics_section.h"
 #include "system/processor.h"
@@ -67,7 +68,8 @@ CheckpointHeader header_of(const Renderer& renderer, const Scene& scene,
             .ranges = {{settings.seed, settings.first_pass, renderer.film().passes()}},
             .film = scene.film(),
             .technique_depth = settings.technique_depth,
-            .conditions = conditions};
+            .conditions = conditions,
+            .choice = settings.choice ? settings.choice->to_json().dump() : ""};
 }
 
 }  // namespace

@@ -40,6 +40,7 @@ CheckpointHeader parse_header(const nlohmann::json& j) {
         h.conditions.emplace_back(c.at(0).get<std::string>(), c.at(1).get<std::string>());
     for (const auto& r : j.at("passes"))
         h.ranges.push_back({natural(r.at(0)), natural(r.at(1)), natural(r.at(2))});
+    h.choice = j.value("choice", "");
     return h;
 }
 
@@ -67,15 +68,15 @@ void save_header(const CheckpointHeader& h, SectionWriter& to) {
     for (const auto& [name, value] : h.conditions) conditions.push_back({name, value});
     for (const PassRange& r : h.ranges) ranges.push_back({r.seed, r.first, r.passes});
     const FilmGeometry& g = h.film;
-    const Json header{
-        {"scene", h.scene},
-        {"integrator", h.integrator},
-        {"estimator", h.estimator},
-        {"passes", ranges},
-        {"merged", h.is_merged},
-        {"film", {g.width, g.height, g.crop_x, g.crop_y, g.crop_width, g.crop_height}},
-        {"technique_depth", h.technique_depth},
-        {"conditions", conditions}};
+    Json header{{"scene", h.scene},
+                {"integrator", h.integrator},
+                {"estimator", h.estimator},
+                {"passes", ranges},
+                {"merged", h.is_merged},
+                {"film", {g.width, g.height, g.crop_x, g.crop_y, g.crop_width, g.crop_height}},
+                {"technique_depth", h.technique_depth},
+                {"conditions", conditions}};
+    if (!h.choice.empty()) header["choice"] = h.choice;
     to.begin("rendering");
     to.put(header.dump(2, ' ', false, Json::error_handler_t::replace));
 }

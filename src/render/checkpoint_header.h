@@ -34,6 +34,8 @@ struct CheckpointHeader {
     FilmGeometry film;
     int technique_depth = 0;  ///< 0 if there are no technique images.
     Conditions conditions;
+    std::string
+        choice;  ///< How `auto` chose the method, as MethodChoice gives it; empty if it did not.
 
     uint64_t passes() const;
     /// What the conditions say of `name`; empty if there is no such condition.

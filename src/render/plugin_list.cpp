@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "integrator/integrator.h"
+#include "integrator/auto.h"
 #include "readers/pbrt.h"
 #include "render/aov.h"
 #include "scene/builder.h"
@@ -41,6 +41,7 @@ void add(std::vector<PluginEntry>& entries, PluginInfo p, const std::string& doc
 
 std::vector<PluginEntry> plugin_list() {
     std::vector<PluginEntry> entries;
+    add(entries, auto_entry().info, auto_entry().info.doc);
     for (const IntegratorEntry& e : integrator_registry()) add(entries, e.info, e.info.doc);
     for (const PluginInfo& p : scene_plugins()) add(entries, p, p.doc);
     for (const IntegratorAlias& a : integrator_aliases()) {

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "render/aov.h"
+#include "render/method_choice.h"
 #include "render/warnings.h"
 
 namespace etendue {
@@ -58,6 +59,7 @@ nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettin
     j["estimator"] = to_string(r.integrator().estimator());
     j["seed"] = settings.seed;
     if (settings.first_pass > 0) j["first_pass"] = settings.first_pass;
+    if (settings.choice) j["auto"] = settings.choice->to_json();
     j["stopped_by"] = stopped_by;
     j["pass_seconds"] = log.seconds;
     j["pass_pairs"] = log.pairs;

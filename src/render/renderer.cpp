@@ -15,6 +15,7 @@
 #include <tbb/parallel_for.h>
 
 #include "film/thread_arena.h"
+#include "render/method_choice.h"
 #include "render/statistics_section.h"
 #include "sampler/pilot_seed.h"
 #include "system/available_memory.h"
@@ -259,11 +260,12 @@ struct Renderer::Workers {
 };
 
 Renderer::Renderer(const Scene& scene, const RenderSettings& settings)
-    : Renderer(scene, settings, make_integrator(settings.integrator)) {}
+    : Renderer(scene, with_chosen_method(scene, settings), nullptr) {}
 
 Renderer::Renderer(const Scene& scene, const RenderSettings& settings,
                    std::unique_ptr<Integrator> integrator)
-    : scene_(scene), settings_(settings), integrator_(std::move(integrator)),
+    : scene_(scene), settings_(settings),
+      integrator_(integrator ? std::move(integrator) : make_integrator(settings.integrator)),
       light_paths_(integrator_->light_paths(scene)),
       film_(fitting_film(scene, settings, *integrator_, light_paths_), scene.filter(),
             typical_radiance(scene), settings.filter_mode),
@@ -275,6 +277,7 @@ Renderer::Renderer(const Scene& scene, const RenderSettings& settings,
     if (settings.technique_depth > 0)
         techniques_ = std::make_unique<TechniqueImages>(
             scene.film(), scene.filter(), settings.technique_depth, typical_radiance(scene));
+    if (settings.choice) seconds_ = settings.choice->seconds;
 }
 
 Renderer::~Renderer() = default;
@@ -711,6 +714,12 @@ std::string Renderer::place_of_failure() const {
                         : fmt::format("after pass {}", film_.passes());
 }
 
+double Renderer::seconds_a_pass() const {
+    if (film_.passes() == 0) return 0;
+    const double before = settings_.choice ? settings_.choice->seconds : 0;
+    return std::max(0.0, seconds_ - before) / double(film_.passes());
+}
+
 int Renderer::round_size(const RenderLimits& limits) const {
     const uint64_t passes = film_.passes(), all = kMostPasses - settings_.first_pass,
                    end =
@@ -748,7 +757,7 @@ StopReason Renderer::run(const RenderLimits& limits,
         return limits.error ? std::optional(error()) : std::nullopt;
     };
     seconds_ = ranks.of_first(seconds_);
-    double round_seconds = film_.passes() > 0 ? seconds_ / double(film_.passes()) : 0;
+    double round_seconds = seconds_a_pass();
     // A round is begun only if at least half of it is expected to fit.
     const auto has_no_time = [&] {
         return limits.seconds && film_.passes() > 0 &&
@@ -794,8 +803,7 @@ StopReason Renderer::run(const RenderLimits& limits,
         }
         if (round.is_incomplete) return end(StopReason::Interrupted);
         // Alone, a round is a pass. The times of passes vary, and their mean less.
-        round_seconds =
-            ranks.count() == 1 ? seconds_ / double(film_.passes()) : so_far - before_round;
+        round_seconds = ranks.count() == 1 ? seconds_a_pass() : so_far - before_round;
         if (has_no_time()) return end(StopReason::Time);
     }
 }

@@ -41,8 +41,12 @@ struct RenderOptions : RenderLimits {
     int technique_depth = 0;
 };
 
+struct MethodChoice;
+
 struct RenderSettings : RenderOptions {
     IntegratorSpec integrator{"path", {}};
+    /// How `integrator` was chosen, if `auto` did it; see with_chosen_method().
+    std::shared_ptr<const MethodChoice> choice = nullptr;
     PathSelection
         shown;  ///< Paths that are added to the image. Other paths are sampled, but not added.
     ContributionObserver* observer = nullptr;  ///< Must outlive the rendering.
@@ -89,9 +93,10 @@ Vec2 film_offset(SamplerKind kind, uint64_t seed, uint32_t pass);
 
 class Renderer {
 public:
-    /// Throws std::runtime_error if the integrator's parameters are wrong. The scene must outlive the renderer.
+    /// Throws std::runtime_error if the integrator's parameters are wrong. The scene must outlive the renderer. If the
+    /// integrator is `auto` and no method is chosen yet, it is chosen here, see with_chosen_method().
     Renderer(const Scene& scene, const RenderSettings& settings);
-    /// Uses `integrator` instead of settings.integrator.
+    /// Uses `integrator` instead of settings.integrator, unless it is nullptr.
     Renderer(const Scene& scene, const RenderSettings& settings,
              std::unique_ptr<Integrator> integrator);
     ~Renderer();
@@ -137,8 +142,11 @@ public:
     const Film& film() const { return film_; }
     uint64_t light_paths() const { return light_paths_; }  ///< Number of light paths in a pass.
     const Integrator& integrator() const { return *integrator_; }
+    /// As given, but with the method that `auto` has chosen.
+    const RenderSettings& settings() const { return settings_; }
     const RenderStats& stats() const { return stats_; }  ///< Statistics of the finished passes.
-    double seconds() const { return seconds_; }          ///< Time of the finished passes in run().
+    /// Time of the finished passes in run(), and of the choice of the method before the first.
+    double seconds() const { return seconds_; }
     ErrorEstimate error() const;  ///< Of the film, computed by the threads of this renderer.
     const TechniqueImages* techniques() const { return techniques_.get(); }
 
@@ -175,6 +183,8 @@ private:
     /// `error`: empty if there is no limit of the error.
     std::optional<StopReason> reached(const RenderLimits& limits,
                                       const std::optional<ErrorEstimate>& error) const;
+    /// Mean time of the finished passes; 0 if there are none.
+    double seconds_a_pass() const;
     /// Number of passes in the next round.
     int round_size(const RenderLimits& limits) const;
 

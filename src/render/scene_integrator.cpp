@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "integrator/auto.h"
 #include "scene/mitsuba_manual.h"
 #include "scene/settings.h"
 
@@ -20,6 +21,7 @@ const ParamInfo* find_param(const std::vector<ParamInfo>& params, std::string_vi
 }
 
 const IntegratorEntry* find_entry(const std::string& name) {
+    if (name == auto_entry().info.name) return &auto_entry();
     for (const IntegratorEntry& e : integrator_registry())
         if (name == e.info.name) return &e;
     return nullptr;
@@ -49,7 +51,7 @@ std::string text_of(const Param& p) {
 std::string unknown_integrator(const std::string& type) {
     if (const ManualEntry* entry = find_manual_entry("integrator", type); entry && entry->refused)
         return fmt::format("integrator \"{}\" is not supported: {}", type, entry->refused);
-    std::vector<std::string> known;
+    std::vector<std::string> known{auto_entry().info.name};
     for (const IntegratorEntry& e : integrator_registry()) known.push_back(e.info.name);
     const std::vector<std::string> own = known;
     for (const IntegratorAlias& a : integrator_aliases()) known.push_back(a.info.name);
@@ -193,7 +195,7 @@ SceneIntegrator scene_integrator(const Scene& scene) {
 }
 
 std::vector<PluginInfo> scene_file_integrators() {
-    std::vector<PluginInfo> all;
+    std::vector<PluginInfo> all{in_scene_files(auto_entry().info.name, auto_entry().info, nullptr)};
     for (const IntegratorAlias& a : integrator_aliases()) {
         const IntegratorEntry* entry = find_entry(a.integrator);
         all.push_back(entry ? in_scene_files(a.info.name, entry->info, &a) : a.info);

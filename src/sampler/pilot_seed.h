@@ -13,6 +13,7 @@ enum class PilotUse : uint64_t {
     Pairs = 0x7061697273,           ///< run_pair_pilot()
     Guide = 0x67756964,             ///< Guiding::train(), plus the index of the pass.
     Chains = 0x70696c6f74,          ///< run_pilot()
+    Choice = 0x63686f696365,        ///< with_chosen_method(), plus the index of the pilot.
     PhotonScale = 0x6d7073,         ///< The scale of the importance of photons.
     PhotonPilot = 0x6d7074,         ///< MetropolisPhotons::run_pilot()
     PhotonPaths = 0x6d70737061,     ///< Paths as states of photons.

@@ -35,7 +35,7 @@ public:
             for (const auto& c : plugins_.params(v.sensor).children("medium"))
                 models_.make_medium(c.object);
         take_models();
-        if (scene_.shapes_.empty() && scene_.emitters_.empty())
+        if (scene_.shapes_.empty() && scene_.owned_->emitters.empty())
             throw SceneError({description_.file, 0}, "the scene has no shapes and no emitters");
         finish_geometry();
         make_sensor(choose_sensor());
@@ -118,11 +118,11 @@ private:
 
     void take_models() {
         Models models = models_.take(strict_normals_);
-        scene_.images_ = std::move(models.images);
-        scene_.textures_ = std::move(models.textures);
-        scene_.materials_ = std::move(models.materials);
-        scene_.images_of_materials_ = std::move(models.images_of_materials);
-        scene_.emitters_ = std::move(models.emitters);
+        scene_.owned_->images = std::move(models.images);
+        scene_.owned_->textures = std::move(models.textures);
+        scene_.owned_->materials = std::move(models.materials);
+        scene_.owned_->images_of_materials = std::move(models.images_of_materials);
+        scene_.owned_->emitters = std::move(models.emitters);
         scene_.media_ = std::move(models.media);
     }
 
@@ -167,8 +167,8 @@ private:
             return shape;
         });
         if (!made) return {};
-        scene_.owned_shapes_.push_back(std::move(made));
-        s.shape = scene_.owned_shapes_.back().get();
+        scene_.owned_->shapes.push_back(std::move(made));
+        s.shape = scene_.owned_->shapes.back().get();
         s.is_mesh = dynamic_cast<const TriangleMesh*>(s.shape) != nullptr;
         s.name = p.object().id.empty() ? p.object().type : p.object().id;
         const auto materials = p.children("bsdf");
@@ -311,7 +311,7 @@ private:
 
     void finish_geometry() {
         scene_.shapes_ = top_;
-        Accelerator& a = scene_.accelerator_;
+        Accelerator& a = scene_.owned_->accelerator;
         a = Accelerator(options_.accelerator);
         for (const SceneShape& s : top_) {
             a.add_shape(*s.shape);
@@ -342,7 +342,7 @@ private:
         Bounds3 bounds = scene_.bounds_;
         bounds.extend(scene_.sensor_->lens_bounds());
         const float radius = std::max(bounds.radius(), 1e-6f);
-        for (auto& e : scene_.emitters_) {
+        for (auto& e : scene_.owned_->emitters) {
             // The margin keeps bounding discs outside all objects.
             e->set_scene_bounds(bounds.is_empty() ? Vec3{} : bounds.center(), radius * 1.001f);
             if (e->is_infinite() && !e->is_delta()) scene_.infinite_.push_back(e.get());
@@ -351,8 +351,8 @@ private:
         }
         if (scene_.has_media()) find_media();
         scene_.selection_ = AliasTable(selection_weights());
-        for (size_t i = 0; i < scene_.emitters_.size(); ++i) {
-            Emitter& e = *scene_.emitters_[i];
+        for (size_t i = 0; i < scene_.owned_->emitters.size(); ++i) {
+            Emitter& e = *scene_.owned_->emitters[i];
             e.index = uint32_t(i);
             if (!scene_.selection_.empty()) e.selection_pmf = scene_.selection_.pmf(e.index);
         }
@@ -365,7 +365,7 @@ private:
     std::vector<double> selection_weights() const {
         std::vector<double> weights;
         double finite = 0, infinite = 0;
-        for (const auto& e : scene_.emitters_) {
+        for (const auto& e : scene_.owned_->emitters) {
             weights.push_back(e->power());
             (e->is_infinite() ? infinite : finite) += weights.back();
         }
@@ -377,7 +377,7 @@ private:
             std::clamp(infinite / (finite + infinite), kLeastShare, 1 - kLeastShare);
         for (size_t i = 0; i < weights.size(); ++i)
             weights[i] *=
-                scene_.emitters_[i]->is_infinite() ? share / infinite : (1 - share) / finite;
+                scene_.owned_->emitters[i]->is_infinite() ? share / infinite : (1 - share) / finite;
         return weights;
     }
 
@@ -386,7 +386,7 @@ private:
         std::map<const Emitter*, const SceneShape*> boundaries;
         for (const SceneShape& s : scene_.shapes_)
             if (s.emitter && s.is_interface) boundaries[s.emitter] = &s;
-        for (auto& e : scene_.emitters_) {
+        for (auto& e : scene_.owned_->emitters) {
             if (const auto it = boundaries.find(e.get()); it != boundaries.end()) {
                 e->medium = it->second->exterior;
                 e->medium_behind = it->second->interior;
@@ -537,11 +537,11 @@ private:
             st.geometry_bytes += s.shape->memory_bytes();
         }
         st.instances = instances_.size();
-        st.materials = scene_.materials_.size();
-        st.textures = scene_.textures_.size();
-        for (const auto& t : scene_.textures_) st.texture_bytes += t->memory_bytes();
-        st.texture_bytes += scene_.images_->memory_bytes();
-        st.accelerator_bytes = scene_.accelerator_.memory_bytes();
+        st.materials = scene_.owned_->materials.size();
+        st.textures = scene_.owned_->textures.size();
+        for (const auto& t : scene_.owned_->textures) st.texture_bytes += t->memory_bytes();
+        st.texture_bytes += scene_.owned_->images->memory_bytes();
+        st.accelerator_bytes = scene_.owned_->accelerator.memory_bytes();
     }
 
     const SceneDescription& description_;

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "math/frame.h"
+#include "sensor/resized.h"
 #include "texture/texture_cache.h"
 
 namespace etendue {
@@ -71,9 +72,20 @@ MediumId medium_beyond(const SurfaceHit& hit, Vec3 d, MediumId before) {
 
 }  // namespace
 
-Scene::Scene() = default;
+Scene::Owned::Owned() = default;
+Scene::Owned::~Owned() = default;
+
+Scene::Scene() : owned_(std::make_shared<Owned>()) {}
 Scene::~Scene() = default;
 Scene::Scene(Scene&&) noexcept = default;
+Scene::Scene(const Scene&) = default;
+
+Scene Scene::seen_by_film(int width, int height) const {
+    Scene other(*this);
+    other.film_ = {.width = width, .height = height, .crop_width = width, .crop_height = height};
+    other.sensor_ = make_resized(sensor_, film_, width, height);
+    return other;
+}
 
 SurfaceGeometry Scene::surface(const SurfaceLocation& at) const {
     const SceneShape& s = shapes_[at.shape];
@@ -82,7 +94,8 @@ SurfaceGeometry Scene::surface(const SurfaceLocation& at) const {
         g = mesh->TriangleMesh::surface(at.prim, at.u, at.v, s.needs_tangents);
     else
         g = s.shape->surface(at.prim, at.u, at.v, s.needs_tangents);
-    if (at.instance != kNoInstance) transform_geometry(accelerator_.instance(at.instance), g);
+    if (at.instance != kNoInstance)
+        transform_geometry(owned_->accelerator.instance(at.instance), g);
     return g;
 }
 
@@ -92,7 +105,7 @@ float Scene::opacity(const SurfaceLocation& at) const {
 
 /// Finds everything but the geometry; false where the ray leaves the scene.
 bool Scene::locate(const Ray& ray, SurfaceHit& hit) const {
-    if (!accelerator_.intersect(ray, hit.location)) return false;
+    if (!owned_->accelerator.intersect(ray, hit.location)) return false;
     hit.shape = &shapes_[hit.location.shape];
     hit.t = hit.location.t;
     hit.has_geometry = false;
@@ -223,13 +236,13 @@ Ray Scene::segment(const RayEnd& a, const RayEnd& b) const {
 
 float Scene::transmittance(const RayEnd& a, const RayEnd& b) const {
     const Ray ray = segment(a, b);
-    if (!has_masks_) return accelerator_.occluded(ray) ? 0.0f : 1.0f;
+    if (!has_masks_) return owned_->accelerator.occluded(ray) ? 0.0f : 1.0f;
     return masked_transmittance(ray);
 }
 
 float Scene::transmittance_to_infinity(const RayEnd& a, Vec3 d) const {
     const Ray ray{offset_origin(a, d), d, kInf};
-    if (!has_masks_) return accelerator_.occluded(ray) ? 0.0f : 1.0f;
+    if (!has_masks_) return owned_->accelerator.occluded(ray) ? 0.0f : 1.0f;
     return masked_transmittance(ray);
 }
 

@@ -90,6 +90,10 @@ public:
     ~Scene();
     Scene(Scene&&) noexcept;
 
+    /// The same scene, of which a film of this size shows what film() shows. It shares everything else with this one, and
+    /// needs no memory of its own beyond a list of the shapes.
+    Scene seen_by_film(int width, int height) const;
+
     // -- Queries of path sampling; thread-safe.
 
     /// The nearest surface; false where there is none. Masked surfaces let the ray pass with probability 1 - opacity,
@@ -115,7 +119,7 @@ public:
     /// Probability that a ray meets the surface there.
     float opacity(const SurfaceLocation& location) const;
     const SceneShape& shape(uint32_t index) const { return shapes_[index]; }
-    const Accelerator& accelerator() const { return accelerator_; }
+    const Accelerator& accelerator() const { return owned_->accelerator; }
     /// Transmittance of masks along the open segment from `a` to `b`; 0 where an opaque surface is in between.
     float transmittance(const RayEnd& a, const RayEnd& b) const;
     float transmittance_to_infinity(const RayEnd& a, Vec3 d) const;
@@ -144,11 +148,11 @@ public:
     /// An emitter chosen with probability proportional to its power, but finite emitters together and infinite emitters
     /// together at least one time in four. `u` is not used where there is only one.
     const Emitter& sample_emitter(double u) const {
-        return *emitters_[emitters_.size() == 1 ? 0u : selection_.sample(u).index];
+        return *emitters()[emitters().size() == 1 ? 0u : selection_.sample(u).index];
     }
-    const Emitter& emitter(uint32_t index) const { return *emitters_[index]; }
+    const Emitter& emitter(uint32_t index) const { return *emitters()[index]; }
     bool has_emitters() const { return !selection_.empty(); }
-    bool has_emitter_choice() const { return emitters_.size() > 1; }
+    bool has_emitter_choice() const { return emitters().size() > 1; }
     /// Whether an emitter has large tables, see Emitter::prefetch_direct().
     bool has_large_emitter_tables() const { return has_large_emitter_tables_; }
     /// Whether any emitter is delta.
@@ -162,7 +166,7 @@ public:
     // -- Information for the command line.
 
     const std::vector<SceneShape>& shapes() const { return shapes_; }
-    const std::vector<std::unique_ptr<Emitter>>& emitters() const { return emitters_; }
+    const std::vector<std::unique_ptr<Emitter>>& emitters() const { return owned_->emitters; }
     const RenderDefaults& defaults() const { return defaults_; }
     const std::vector<std::string>& warnings() const { return warnings_; }
     const Bounds3& bounds() const { return bounds_; }
@@ -181,6 +185,20 @@ public:
 
 private:
     friend class SceneBuilder;
+    /// What scenes that differ in their films share.
+    struct Owned {
+        std::vector<std::unique_ptr<Shape>> shapes;
+        std::unique_ptr<TextureCache> images;
+        std::vector<std::unique_ptr<Texture>> textures;
+        std::vector<std::unique_ptr<Material>> materials;
+        ImagesOfMaterials images_of_materials;
+        std::vector<std::unique_ptr<Emitter>> emitters;
+        Accelerator accelerator;
+
+        Owned();
+        ~Owned();
+    };
+    Scene(const Scene&);  ///< Shares what the other one owns.
     bool locate(const Ray& ray, SurfaceHit& hit) const;
     Ray segment(const RayEnd& a, const RayEnd& b) const;
     float masked_transmittance(const Ray& ray) const;
@@ -192,18 +210,12 @@ private:
     Ray for_each_surface(Ray ray, const Stops& stops, const Passes& passes) const;
 
     std::string file_;
-    std::vector<std::unique_ptr<Shape>> owned_shapes_;
-    std::unique_ptr<TextureCache> images_;
-    std::vector<std::unique_ptr<Texture>> textures_;
-    std::vector<std::unique_ptr<Material>> materials_;
-    ImagesOfMaterials images_of_materials_;
-    std::vector<std::unique_ptr<Emitter>> emitters_;
+    std::shared_ptr<Owned> owned_;
     std::vector<SceneShape> shapes_;  ///< By the accelerator's shape index.
     std::vector<Rgb> media_;          ///< Extinction σ_t, 1/length.
     std::vector<const Emitter*> infinite_;
     AliasTable selection_;
-    Accelerator accelerator_;
-    std::unique_ptr<Sensor> sensor_;
+    std::shared_ptr<const Sensor> sensor_;
     FilmGeometry film_;
     ReconstructionFilter filter_ = ReconstructionFilter::box();
     RenderDefaults defaults_;

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "film/thread_arena.h"
+#include "render/method_choice.h"
 #include "session/file_version.h"
 #include "session/run.h"
 #include "session/run_record.h"
@@ -199,6 +200,8 @@ std::shared_ptr<Session::Run> Session::load_run(const std::string& name) {
     s.request = request_of(header);
     s.request.threads = threads_;
     s.estimator = estimator_named(header.estimator);
+    if (!header.choice.empty())
+        s.choice = std::make_shared<const MethodChoice>(MethodChoice::from_json(header.choice));
     s.state = RunState::Stopped;
     const bool is_own = load_record(file.sections(), s);
     const bool fits = technique_images_fit(loaded->scene, header.technique_depth);
@@ -208,6 +211,7 @@ std::shared_ptr<Session::Run> Session::load_run(const std::string& name) {
             throw std::runtime_error(
                 fmt::format("its technique images need more than {} MiB", kTechniqueBytes >> 20));
         run->settings = answering(settings_of(s.request, IntegratorSpec::parse(header.integrator)));
+        run->settings.choice = s.choice;
         auto renderer = std::make_unique<Renderer>(loaded->scene, run->settings);
         run->conditions = conditions_of(*renderer, loaded->scene, loaded->source, run->settings);
         file.resume(*renderer, run->conditions, run->log);

@@ -10,6 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include "film/thread_arena.h"
+#include "integrator/auto.h"
+#include "render/method_choice.h"
 #include "render/render_report.h"
 #include "render/render_request.h"
 #include "session/run.h"
@@ -240,12 +242,26 @@ void Session::make_renderer(Run& run) {
     run.error = {};
     run.settings.seed = run.status.request.seed + uint64_t(run.seeds.count());
     std::unique_ptr<Integrator> integrator = std::move(run.integrator);
+    if (is_auto(run.settings.integrator)) integrator = chosen_method(run);
     if (!integrator) integrator = make_integrator(run.settings.integrator);
     run.renderer = std::make_unique<Renderer>(run.scene(), run.settings, std::move(integrator));
     run.log = {};
     if (!folder_) return;
     run.conditions = conditions_of(*run.renderer, run.scene(), run.loaded->source, run.settings);
     wait_for_next_file(run, 0);
+}
+
+std::unique_ptr<Integrator> Session::chosen_method(Run& run) {
+    run.settings = with_chosen_method(run.scene(), run.settings);
+    std::unique_ptr<Integrator> integrator = make_integrator(run.settings.integrator);
+    const std::lock_guard lock(mutex_);
+    RunStatus& s = run.status;
+    s.request.integrator = run.settings.choice->chosen;
+    s.choice = run.settings.choice;
+    s.estimator = integrator->estimator();
+    s.interval =
+        interval_kind(s.estimator, run.settings.sampler, integrator->error_groups() > 0, s.seeds);
+    return integrator;
 }
 
 void Session::take_turn(Run& run) {

@@ -68,6 +68,7 @@ struct RunStatus {
     ErrorEstimate error;
     Estimator estimator = Estimator::Unbiased;
     IntervalKind interval = IntervalKind::Confidence;
+    std::shared_ptr<const MethodChoice> choice;  ///< Where `auto` has chosen the method.
     std::vector<std::pair<std::string, double>> figures;
     std::vector<ConvergencePoint> history;  ///< Points that are about equally spaced in log time.
     bool is_of_this_scene = true;           ///< False after the scene was loaded again.
@@ -213,6 +214,8 @@ private:
     std::shared_ptr<Run> next_run() const;
     void take_turn(Run& run);
     void make_renderer(Run& run);
+    /// Lets `auto` choose the method of a run.
+    std::unique_ptr<Integrator> chosen_method(Run& run);
     void after_pass(Run& run, const Progress& progress);
     /// Publishes a snapshot, and the technique images if they were requested. Where there is no memory for them, the
     /// earlier ones stay.

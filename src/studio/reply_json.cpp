@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "render/method_choice.h"
 #include "render/render_request.h"
 #include "studio/guard.h"
 
@@ -87,6 +88,10 @@ json to_json(const KeptRun& run) {
 json to_json(const RunStatus& s) {
     json j = progress_of(s);
     j["integrator"] = s.request.integrator;
+    if (s.choice) {
+        j["auto"] = json::parse(s.choice->to_json().dump());
+        j["auto"]["message"] = s.choice->message();
+    }
     j["why_look_only"] = s.why_look_only;
     j["sampler"] = to_string(s.request.sampler);
     j["filter_mode"] = to_string(s.request.filter_mode);

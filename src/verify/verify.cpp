@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "integrator/auto.h"
+#include "render/method_choice.h"
 #include "render/warnings.h"
 #include "system/failure.h"
 #include "verify/comparisons.h"
@@ -397,10 +399,29 @@ std::vector<IntegratorSpec> with_long_chains(const std::vector<IntegratorSpec>& 
     return all;
 }
 
+/// What renders: of `auto`, the method that it chooses.
+IntegratorSpec rendering_method(const Scene& scene, const IntegratorSpec& method,
+                                const VerifyOptions& options) {
+    if (!is_auto(method)) return method;
+    RenderSettings settings;
+    settings.integrator = limited(method, options.longest);
+    settings.sampler = options.sampler;
+    settings.seed = options.seed;
+    settings.threads = options.threads;
+    settings.spp = options.spp;
+    settings.seconds = options.seconds;
+    IntegratorSpec chosen = with_chosen_method(scene, settings).integrator;
+    chosen.params.erase("max_depth");
+    return chosen;
+}
+
 VerifyReport verify(const Scene& scene, const std::vector<IntegratorSpec>& given_methods,
                     const VerifyOptions& options, const std::optional<ReferenceImage>& reference,
                     const std::function<void(const std::string&)>& progress) {
-    const std::vector<IntegratorSpec> methods = with_long_chains(given_methods);
+    std::vector<IntegratorSpec> chosen;
+    for (const IntegratorSpec& m : given_methods)
+        chosen.push_back(rendering_method(scene, m, options));
+    const std::vector<IntegratorSpec> methods = with_long_chains(chosen);
     SeriesRenderer renderer(scene, options, progress);
     VerifyReport report;
     try {

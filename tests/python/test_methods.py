@@ -60,3 +60,21 @@ def test_what_is_no_integrator(cornell: et.Scene) -> None:
     for other in (3, ["path"]):
         with pytest.raises(TypeError, match="an integrator is a text such as"):
             et.render(cornell, other)  # type: ignore[arg-type]
+
+
+def test_auto_tells_what_it_has_chosen(cornell: et.Scene) -> None:
+    result = et.render(cornell, "auto:chains=false", spp=128, progress=False)
+    auto = result.stats["auto"]
+    assert auto["asked"].startswith("auto:chains=false") and auto["chosen"] == result.stats["integrator"]
+    assert auto["candidates"][0]["method"] == auto["chosen"]
+    assert result.seconds >= auto["seconds"] > 0
+    given = et.render(cornell, auto["chosen"], spp=128, progress=False)
+    np.testing.assert_array_equal(given.image, result.image)
+    assert "auto" not in given.stats
+
+
+def test_a_choice_is_kept_in_checkpoints(cornell: et.Scene, tmp_path: Path) -> None:
+    first = et.render(cornell, et.integrator("auto", chains=False), spp=128, progress=False)
+    first.save(tmp_path / "a.etd")
+    resumed = et.resume(tmp_path / "a.etd", cornell, spp=130, progress=False)
+    assert resumed.stats["auto"] == first.stats["auto"]

@@ -77,3 +77,24 @@ def test_what_checkpoints_cost_is_measured_after_every_pass(tmp_path: Path, monk
     monkeypatch.setattr(checkpoint_cost, "render", lambda *_: stats)
     with pytest.raises(SystemExit, match="path: 2 checkpoints between 4 passes"):
         checkpoint_cost.measure_method(None, "path", argparse.Namespace(passes=4), tmp_path)
+
+
+@pytest.mark.parametrize("line, dead", [
+    ("[a](b.md#a-heading--here)", ""),
+    ("[a](b.md) and ![a](b.png)", "b.png"),
+    ("[over two\nlines](c.md)", "c.md"),
+    ("[a](b.md#another-heading)", "b.md#another-heading"),
+    ("[a](#nothing)", "#nothing"),
+    ('<img src="c.jpg">', "c.jpg"),
+    ("`[a](c.md)`\n\n    [a](c.md)\n\n```\n[a](c.md)\n```\n", ""),
+    ("[a](https://example.org/c.md)", ""),
+    ("[a](../b.md)", "../b.md"),
+])
+def test_dead_links_of_the_manual_are_found(tmp_path: Path, line: str, dead: str) -> None:
+    (tmp_path / "scripts").mkdir()
+    (tmp_path / "scripts" / "links").write_text((ROOT / "scripts" / "links").read_text())
+    (tmp_path / "a.md").write_text(f"# Page\n\n{line}\n")
+    (tmp_path / "b.md").write_text("# B\n\n```\n# Another heading\n```\n\n## A *heading* `+` here\n")
+    result = subprocess.run([sys.executable, tmp_path / "scripts" / "links"], capture_output=True, text=True)
+    assert result.returncode == (1 if dead else 0), result.stderr
+    assert (f": {dead}\n" in result.stderr) if dead else result.stderr == ""

@@ -8,9 +8,20 @@
 namespace etendue {
 namespace {
 
-/// Of directions at vertices between two chains [Veach 1997, §11.4.4].
+/// Of directions at vertices between two chains [Veach 1997, §11.4.4]. Veach has 1e-4; but angles this small cannot be
+/// computed from the vertices.
 constexpr float kDegree = kPi / 180;
-constexpr LogRange kTurns{1e-4f * kDegree, 0.1f * kDegree};
+constexpr LogRange kTurns{1e-3f * kDegree, 0.1f * kDegree};
+
+/// Density of y_{i-1} from y_i, if the direction to x_{i-1} was turned by an angle whose logarithm is uniform; up to a
+/// constant.
+double turned_density(const PathState& x, const PathState& y, int i) {
+    const Vertex& at = y[i].v;
+    const Vec3 difference = direction(at, y[i - 1].v) - direction(at, x[i - 1].v);
+    const float angle = 2 * std::asin(std::min(0.5f * length(difference), 1.0f));
+    if (!kTurns.contains(angle)) return 0;
+    return y.geometry_from_eye(i - 1) / double(angle * std::sin(angle));
+}
 
 }  // namespace
 
@@ -56,7 +67,6 @@ bool EyeChainMutation::propose(const PathState& x, const MutationContext& c, Pat
     if (!builder.start_eye({x.film.x + r * std::cos(azimuth), x.film.y + r * std::sin(azimuth)}))
         return false;
     for (int i = k - 1; i > end; --i) {
-        const Vertex& like = x[i].v;
         const Vertex& at = builder.eye_end();
         std::optional<BsdfSample> s;
         if (is_followed(x, i, events_)) {
@@ -64,7 +74,8 @@ bool EyeChainMutation::propose(const PathState& x, const MutationContext& c, Pat
         } else if (at.is_connectible) {
             c.sampler.seek(Stream::Selection, addresses::kTurn + uint64_t(i));
             const float angle = kTurns.sample(c.sampler.next_1d());
-            s = given(turned(direction(like, x[i - 1].v), angle, c.sampler.next_1d()));
+            // Toward the old vertex: the old direction would miss it by as much as x_i moves.
+            s = given(turned(direction(at, x[i - 1].v), angle, c.sampler.next_1d()));
         }
         if (!s || !builder.step_eye(*s)) return false;
     }
@@ -79,11 +90,11 @@ PathDensity EyeChainMutation::Q(const PathState& x, const PathState& y,
     if (chains(y).end != way.l + 1) return 0;
     for (int i = k - 1; i > std::max(way.l, 0); --i)
         if (!is_same_event(x, y, i, events_)) return 0;
-    // Film points, turned directions and half vectors have the same density in both directions.
+    // Film points and half vectors have the same density in both directions.
     PathDensity p = y.eye(k - 1);
     for (int i = k - 1; i > way.l + 1; --i)
         p *= is_followed(y, i, events_) ? followed_density(y, i, TransportMode::Radiance)
-                                        : y.geometry_from_eye(i - 1);
+                                        : turned_density(x, y, i);
     return p;
 }
 

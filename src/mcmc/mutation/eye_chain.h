@@ -1,7 +1,9 @@
 #pragma once
 // Lens perturbation and multi-chain perturbation [Veach 1997, §11.4.2 and §11.4.4]: the film point moves slightly, and the
 // eye sub-path follows the same delta events as before, up to a vertex that is joined to the kept part, or up to the
-// emitter. At a vertex between two chains of delta events, the direction is turned by a small angle.
+// emitter. At a vertex between two chains of delta events, the new direction is that toward the old vertex, turned by a
+// small angle. Veach turns the old direction instead, which misses the old vertex by as much as the vertex between the
+// chains has moved.
 
 #include "mcmc/mutation/perturbation.h"
 

@@ -44,6 +44,22 @@ function describeFile(run) {
     return kept + (run.file_problem ? `; not kept: ${run.file_problem}` : '') + (run.why_look_only ? `; it can only be looked at: ${run.why_look_only}` : '');
 }
 
+/**
+ * Why `auto` has chosen the method of a run.
+ * @param {HTMLElement} details @param {any} auto
+ */
+function showChoice(details, auto) {
+    const number = (/** @type {number} */ v) => v.toPrecision(2);
+    const row = (/** @type {string} */ kind, /** @type {string[]} */ texts) =>
+        element('tr', {}, texts.map(textContent => element(kind, {textContent})));
+    const candidates = auto.candidates.map((/** @type {any} */ c) => row('td', c.images > 0
+        ? [c.method, number(c.noise), number(c.missing), number(1e6 * c.sample_seconds), String(c.pixels)]
+        : [c.method, 'no pilot', '', '', '']));
+    details.replaceChildren(element('summary', {textContent: auto.message}),
+        element('table', {}, [row('th', ['method', 'noise', 'missing light', 'µs a sample', 'pixels of the pilot']), ...candidates]));
+    details.hidden = false;
+}
+
 export class RunList {
     /**
      * @param {HTMLElement} parent
@@ -58,17 +74,18 @@ export class RunList {
 
     /** @param {any} run */
     makeRow(run) {
-        const figures = element('div', {className: 'figures'}), state = element('span');
+        const figures = element('div', {className: 'figures'}), state = element('span'), name = element('span');
+        const choice = element('details', {hidden: true});
         const button = (/** @type {string} */ text, /** @type {string} */ action) => element('button', {type: 'button',
             textContent: text, 'aria-label': `${text} run ${run.id}`, onclick: () => this.tell.act(action, run.id)});
         const toggle = element('button', {type: 'button'}), discard = button('Discard pass', 'discard');
         const box = element('div', {className: 'run'}, [
-            element('div', {className: 'name'}, [state, ` ${run.id}: ${run.integrator}`]), figures,
+            element('div', {className: 'name'}, [state, name]), figures, choice,
             element('div', {className: 'bar'}, [
                 element('button', {type: 'button', textContent: 'Show', 'aria-label': `Show run ${run.id}`, onclick: () => this.tell.show(run.id)}),
                 toggle, discard, button('Save', 'save'), button('Remove', 'remove')])]);
         this.parent.append(box);
-        return {box, figures, state, toggle, discard};
+        return {box, figures, state, name, choice, toggle, discard};
     }
 
     /** @param {any[]} runs */
@@ -81,6 +98,9 @@ export class RunList {
             const isRendering = run.state === 'rendering', isInPass = isRendering || run.state === 'stopping';
             row.state.textContent = /** @type {any} */ (kSymbols)[run.state];
             row.state.title = run.state;
+            const name = ` ${run.id}: ${run.integrator}`;
+            if (row.name.textContent !== name) row.name.textContent = name;
+            if (run.auto && row.choice.hidden) showChoice(row.choice, run.auto);
             const text = `${run.state}: ${describe(run)}${run.old_scene ? ' (earlier version of the scene)' : ''}${run.message ? `: ${run.message}` : ''}${describeFile(run)}`;
             if (row.figures.textContent !== text) row.figures.textContent = text;
             row.figures.classList.toggle('error', run.state === 'failed' || Boolean(run.file_problem));

@@ -99,10 +99,10 @@ TEST(Chain, NothingIsAcceptedWithoutAnAcceptance) {
     const WholeFilm whole(pass);
     const ChainContext c{whole.sample, toy.work()};
     Chain chain(space, 0);
-    chain.start(1, c);
+    chain.start({.key = 1}, c);
     NoStates none;
     ChainStats stats;
-    chain.advance({.p_large = 0.5, .c = 1}, 1, 1, 2, 0, 1000, c, none, stats);
+    chain.advance({.p_large = 0.5, .c = 1}, 1, 1, 2, 1000, c, none, stats);
     EXPECT_GT(stats.steps[0][3].accepted, 0);
     double accepted = 0;
     uint64_t proposed = 0;

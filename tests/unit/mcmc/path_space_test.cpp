@@ -201,6 +201,67 @@ TEST_P(Paths, AreToldAsJoins) {
     }
 }
 
+/// Each join of a sample of bidirectional path tracing is recalled as the path that it made: its weight is the target of
+/// this path over the density of the technique, times the MIS weight.
+TEST_P(Paths, AreRecalledFromSamples) {
+    const auto space = passes.space({});
+    const WeighedSample samples = passes.samples();
+    const WholeFilm whole(passes.pass());
+    const ChainContext c{whole.sample, passes.work()};
+    const auto state = space->make_state();
+    const auto& x = static_cast<const PathState&>(*state);
+    const double A = double(passes.measure().film.area());
+    const bool has_masks = passes.scene().has_masks();
+    std::array<int, 5> found{};  // By strategy.
+    int lost = 0;
+    for (uint64_t i = 0; i < 1500; ++i) {
+        const uint64_t key = hash_combine(8, i);
+        std::vector<Find> finds;
+        space->sample(key, c, finds);
+        std::vector<Technique> techniques;
+        Sampler sampler(SamplerKind::Independent, key);
+        sampler.start(0, 0);
+        samples.for_each_part(sampler, c,
+                              [&](const Join& j, double) { techniques.push_back(j.technique); });
+        ASSERT_EQ(techniques.size(), finds.size());
+        for (size_t n = 0; n < finds.size(); ++n) {
+            // Those near the smallest numbers are rounded.
+            if (finds[n].weight < 1e-30) continue;
+            const Technique& q = techniques[n];
+            space->recall(finds[n], c, *state);
+            if (!(x.target > 0)) {
+                ++lost;
+                continue;
+            }
+            ASSERT_EQ(x.size(), q.vertices());
+            const double escapes = double(passes.scene().infinite_emitters().size());
+            const auto density = [&](int s) {
+                const double choice = s == 0 && x[0].v.is_infinite && escapes > 0 ? escapes : 1.0;
+                return double(x.density(s) * choice / x.large_step_density());
+            };
+            const double from_technique = x.target / density(q.s);
+            double sum = 0, own = 0;
+            for (int s = 0; s <= x.size(); ++s) {
+                const Technique r = connection_technique(s, x.size() - s);
+                const double np = double(passes.counts().of(r)) * density(s) * (r.t >= 2 ? A : 1.0);
+                sum += sqr(np);
+                if (s == q.s) own = sqr(np);
+            }
+            // Masks are part of these densities, but not of those in MIS weights.
+            const double expected = from_technique * own / sum;
+            ASSERT_NEAR(finds[n].weight, expected, has_masks ? from_technique : 2e-3 * expected)
+                << q.s << ", " << q.t;
+            ++found[size_t(q.s == 0 ? 0 : q.s == 1 ? 1 : q.t >= 2 ? 2 : q.t == 1 ? 3 : 4)];
+        }
+    }
+    EXPECT_GT(found[1], 100);
+    EXPECT_GT(found[2], 100);
+    EXPECT_GT(found[3], 100);
+    // Where there are masks, all edges are traced again; by rounding, few of those that leave glass are then blocked.
+    EXPECT_LE(lost, has_masks ? found[2] / 100 : 0);
+    EXPECT_GT(found[0], hits_emitters(passes.scene()) ? 5 : -1);
+}
+
 bool has_no_edge_below(const PathState& x, double limit) {
     for (int i = 1; i < x.last(); ++i)
         if (!x[i - 1].v.is_infinite && double(length(x[i].v.p - x[i - 1].v.p)) < limit)
@@ -246,6 +307,46 @@ TEST_P(Paths, LargeStepsThatFollowUserPathsHaveTheirDensity) {
             << std::sqrt(means[1][f].squared_error());
     EXPECT_GT(found[0], 2e-5);
     EXPECT_GT(found[1], 10 * found[0]);
+}
+
+/// What samples find has the same mean as independent states have, also if it is multiplied by a function of the path.
+TEST_P(Paths, AreFoundInProportionToTheTarget) {
+    const WholeFilm whole(passes.pass());
+    const ChainContext c{whole.sample, passes.work()};
+    const auto space = passes.space({});
+    const auto state = space->make_state();
+    const auto& x = static_cast<const PathState&>(*state);
+    constexpr size_t kFunctions = 4;
+    using Values = std::array<double, kFunctions>;
+    const auto add = [&](double weight, Values& values) {
+        // The value of paths with arbitrarily short edges has no finite variance.
+        if (!(x.target > 0) || !has_no_edge_below(x, 0.3)) return;
+        const Values functions{1, double(x.last()), double(x.film.x), double(x[1].v.p.y)};
+        for (size_t f = 0; f < kFunctions; ++f) values[f] += weight * functions[f];
+    };
+    std::array<Moments, kFunctions> drawn, found;
+    for (uint64_t i = 0; i < 100000; ++i) {
+        Values values{};
+        space->draw(0, hash_combine(9, i), c, *state);
+        add(state->target, values);
+        for (size_t f = 0; f < kFunctions; ++f) drawn[f].add(values[f]);
+    }
+    std::vector<Find> finds;
+    for (uint64_t i = 0; i < 6000; ++i) {
+        Values values{};
+        finds.clear();
+        space->sample(hash_combine(10, i), c, finds);
+        for (const Find& find : finds) {
+            space->recall(find, c, *state);
+            add(find.weight, values);
+        }
+        for (size_t f = 0; f < kFunctions; ++f) found[f].add(values[f]);
+    }
+    for (size_t f = 0; f < kFunctions; ++f)
+        EXPECT_GT(welch_p(drawn[f], found[f], 0), sidak(1e-4, kFunctions))
+            << "function " << f << ": " << drawn[f].mean() << " ± "
+            << std::sqrt(drawn[f].squared_error()) << ", " << found[f].mean() << " ± "
+            << std::sqrt(found[f].squared_error());
 }
 
 /// Logarithm of a cosine or of 1/d², zero where there is none.

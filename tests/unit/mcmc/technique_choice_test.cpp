@@ -2,9 +2,12 @@
 
 #include "mcmc/technique_choice.h"
 
+#include <array>
 #include <cmath>
 
 #include <gtest/gtest.h>
+
+#include "test_scenes.h"
 
 namespace etendue::test {
 namespace {
@@ -37,6 +40,46 @@ TEST(LengthChoice, IsMadeWithItsProbability) {
                     << k;
         }
     }
+}
+
+const std::string kPointLamp =
+    "<emitter type=\"point\"><point name=\"position\" value=\"0,0.7,0.5\"/></emitter>";
+
+/// Calls choose(u), and then inverse(v), which is to choose the same. Both are uniformly distributed.
+template <class Choose, class Inverse>
+void expect_inverse(const Choose& choose, const Inverse& inverse) {
+    constexpr int kBins = 20, kNumbers = 40000;
+    std::array<int, kBins> counts{};
+    for (int i = 0; i < kNumbers; ++i) {
+        const double u = (i + 0.5) / kNumbers, v = std::fmod(i * 0.6180339887498949, 1.0);
+        const auto chosen = choose(u);
+        const double again = inverse(chosen, 0.0005 + 0.999 * v);
+        ASSERT_EQ(choose(again), chosen) << u << ", " << again;
+        ++counts[size_t(std::min(again * kBins, kBins - 1.0))];
+    }
+    for (const int n : counts) EXPECT_NEAR(double(n) * kBins / kNumbers, 1, 0.03);
+}
+
+TEST(LengthChoice, HasAnInverse) {
+    for (const int longest : {3, 4, 9, 1000000})
+        for (const TechniqueLight& light :
+             {light_of(0, 1, 1), light_of(0.95, 3, 40), light_of(0.3, 3, 9)}) {
+            const LengthChoice choice(3, longest, light);
+            expect_inverse([&](double u) { return choice.choose(u); },
+                           [&](int k, double v) { return choice.number(k, v); });
+        }
+}
+
+TEST(TechniqueChoice, HasAnInverse) {
+    for (const std::string& emitter : {area_lamp(), kPointLamp})
+        for (const std::string& camera : {front_camera(8), lens_camera(8)}) {
+            const Scene scene = build(camera + room() + emitter);
+            const TechniqueChoice choice(scene, 3, 2,
+                                         {{{3, 1}, 2.0}, {{3, 3}, 1.0}, {{4, 2}, 1.0}});
+            for (const int k : {3, 4, 7})
+                expect_inverse([&](double u) { return choice.choose(k, u); },
+                               [&](int s, double v) { return choice.number(k, s, v); });
+        }
 }
 
 /// The second moment of light/p(k), relative to the squared mean, stays near 1, although the pilot saw no more than a part

@@ -116,9 +116,10 @@ TEST(PilotNumbers, DifferByUse) {
     std::set<uint64_t> seeds;
     int count = 0;
     for (const uint64_t seed : {0, 1, 2})
-        for (const PilotUse use : {PilotUse::OtherPaths, PilotUse::LightPathCount, PilotUse::Pairs,
-                                   PilotUse::Guide, PilotUse::Chains, PilotUse::PhotonScale,
-                                   PilotUse::PhotonPilot, PilotUse::PhotonPaths}) {
+        for (const PilotUse use :
+             {PilotUse::OtherPaths, PilotUse::LightPathCount, PilotUse::Pairs, PilotUse::Guide,
+              PilotUse::Chains, PilotUse::PhotonScale, PilotUse::PhotonPilot, PilotUse::PhotonPaths,
+              PilotUse::Choice}) {
             seeds.insert(pilot_seed(seed, use));
             ++count;
             EXPECT_NE(pilot_seed(seed, use), seed);

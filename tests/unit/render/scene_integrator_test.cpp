@@ -136,9 +136,9 @@ TEST(SceneIntegrator, ErrorsSayWhereAndWhatIsNear) {
                                              "mean \"upg+bdpt\"?); choose another integrator");
     EXPECT_NE(error(integrator("photonmaper")).find("did you mean \"photonmapper\"?"),
               std::string::npos);
-    EXPECT_NE(
-        error(integrator("no_such")).find("unknown integrator \"no_such\" (known: path, light"),
-        std::string::npos);
+    EXPECT_NE(error(integrator("no_such"))
+                  .find("unknown integrator \"no_such\" (known: auto, path, light"),
+              std::string::npos);
     EXPECT_NE(error(integrator("vcm", "<float name=\"radios\" value=\"1\"/>"))
                   .find("test.xml:2: integrator \"vcm\" has no parameter \"radios\" (did you mean "
                         "\"radius\"?)"),

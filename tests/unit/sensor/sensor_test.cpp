@@ -9,6 +9,7 @@
 
 #include "sensor/orthographic.h"
 #include "sensor/perspective.h"
+#include "sensor/resized.h"
 
 namespace etendue {
 namespace {
@@ -117,6 +118,39 @@ TEST_P(Sensors, MeasureWhatHitsALens) {
             EXPECT_GE(ray.p[axis], b.lo[axis] - 1e-5f);
             EXPECT_LE(ray.p[axis], b.hi[axis] + 1e-5f);
         }
+    }
+}
+
+/// A film of another size shows the same, with larger pixels.
+TEST_P(Sensors, CanHaveAFilmOfAnotherSize) {
+    constexpr int kColumns = 9, kRows = 5;
+    const FilmGeometry& g = GetParam().film;
+    const std::shared_ptr<const Sensor> whole = make(GetParam());
+    const auto small = make_resized(whole, g, kColumns, kRows);
+    const Vec2 pixel{float(g.crop_width) / kColumns, float(g.crop_height) / kRows};
+    EXPECT_EQ(small->is_orthographic(), whole->is_orthographic());
+    EXPECT_EQ(small->has_finite_lens(), whole->has_finite_lens());
+    for (int i = 0; i < 1000; ++i) {
+        const Vec2 film{number() * kColumns, number() * kRows}, u = lens_numbers();
+        const SensorRay ray = small->sample_ray(film, u);
+        const SensorRay same = whole->sample_ray(
+            {float(g.crop_x) + film.x * pixel.x, float(g.crop_y) + film.y * pixel.y}, u);
+        expect_near(ray.d, same.d, 1e-6f);
+        expect_near(ray.p, same.p, 1e-5f);
+        EXPECT_NEAR(ray.pdf_dir * pixel.x * pixel.y, same.pdf_dir, 1e-5f * same.pdf_dir);
+        EXPECT_NEAR(small->pdf_direction(ray.p, ray.d), ray.pdf_dir, 1e-5f * ray.pdf_dir);
+        expect_near(small->ray_from(ray.p, film).d, ray.d, 1e-5f);
+        const Vec3 seen = ray.p + ray.d * (0.5f + 9 * number());
+        const auto back = small->sample_connection(seen, false, u);
+        ASSERT_TRUE(back);
+        expect_measured(*back, ray, film);
+        if (!whole->has_finite_lens()) continue;
+        const auto connected = small->connection_to(ray.p, seen, false);
+        ASSERT_TRUE(connected);
+        expect_measured(*connected, ray, film);
+        const auto hit = small->hit_lens(seen, -ray.d, kInf);
+        ASSERT_TRUE(hit);
+        expect_measured(*hit, ray, film);
     }
 }
 

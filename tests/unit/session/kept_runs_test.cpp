@@ -9,8 +9,10 @@
 #include <future>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "render/checkpoint.h"
+#include "render/method_choice.h"
 #include "run_program.h"
 #include "run_request.h"
 #include "session/session.h"
@@ -431,6 +433,27 @@ TEST_F(KeptRuns, TracePathsAgainAfterAnotherPass) {
     EXPECT_NE(problem().find("opened from a file"), std::string::npos);
     continue_to(run, 4);
     EXPECT_EQ(problem(), "");
+}
+
+TEST_F(KeptRuns, KeepWhatAutoHasChosen) {
+    open_session();
+    const int run = session->start(run_of("auto", 1u << 30));
+    ASSERT_TRUE(wait_for([&] { return session->status(run).passes > 0; }));
+    session->stop(run);
+    ASSERT_TRUE(is_in(run, RunState::Stopped));
+    session->settle();
+    const RunStatus before = session->status(run);
+    ASSERT_TRUE(before.choice);
+    EXPECT_EQ(before.request.integrator, before.choice->chosen);
+    EXPECT_EQ(before.choice->candidates.front().method, before.choice->chosen);
+    open_session();
+    const Opened opened = open(before.file);
+    ASSERT_EQ(opened.error, "");
+    const RunStatus after = session->status(opened.run);
+    EXPECT_EQ(after.why_look_only, "");
+    EXPECT_EQ(after.request.integrator, before.request.integrator);
+    ASSERT_TRUE(after.choice);
+    EXPECT_EQ(after.choice->to_json(), before.choice->to_json());
 }
 
 }  // namespace

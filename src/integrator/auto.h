@@ -1,0 +1,15 @@
+#pragma once
+
+#include "integrator/integrator.h"
+
+namespace etendue {
+
+/// Parameters of `auto`, which chooses one of the other integrators; see with_chosen_method(). Where there is no scene to
+/// choose for, it is `bdpt`.
+const IntegratorEntry& auto_entry();
+
+inline bool is_auto(const IntegratorSpec& spec) {
+    return !spec.make && spec.name == auto_entry().info.name;
+}
+
+}  // namespace etendue

@@ -1,0 +1,18 @@
+#pragma once
+// What passes cost, from their counters and a fixed table, so that a choice by cost does not depend on the machine.
+
+#include <string>
+
+#include "pathspace/render_stats.h"
+
+namespace etendue {
+
+/// Seconds that one thread of a usual machine takes for what `stats` has counted of a method, in a scene of middle size. In
+/// one scene, methods are to each other as these figures are, within about a fifth.
+double simulated_seconds(const std::string& method, const RenderStats& stats);
+/// The same for a sample of a method of which nothing is known yet.
+double typical_sample_seconds(const std::string& method);
+/// The same for a guide that is trained by so many walks of each kind.
+double training_seconds(uint64_t walks);
+
+}  // namespace etendue

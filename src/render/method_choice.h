@@ -1,0 +1,49 @@
+#pragma once
+// `auto`: pilots on a small film choose the method of a rendering. See docs/integrators/auto.md.
+
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "render/renderer.h"
+
+namespace etendue {
+
+/// What was chosen, and why. Simulated seconds are those of cost_table.h.
+struct MethodChoice {
+    std::string asked;   ///< The integrator that was asked for: `auto`, with all its parameters.
+    std::string chosen;  ///< The integrator that renders.
+    struct Candidate {
+        std::string method;
+        /// Of the last pilot, on a film of so many pixels; 0: there was none.
+        int pixels = 0, images = 0;
+        double sample_seconds = 0;      ///< Simulated, of a sample of a pixel.
+        double start_seconds = 0;       ///< Simulated, before the first pass of the rendering.
+        double noise = 0, missing = 0;  ///< Parts of the predicted error, see pilot_score.h.
+
+        double error() const { return noise + missing; }
+    };
+    /// Those with the largest pilots first, and among them the best.
+    std::vector<Candidate> candidates;
+    double budget = 0;   ///< Simulated seconds of the rendering.
+    double pilots = 0;   ///< Simulated seconds of the pilots.
+    double seconds = 0;  ///< Elapsed time of the pilots.
+
+    /// One line for the log.
+    std::string message() const;
+    nlohmann::ordered_json to_json() const;
+    /// From the text of to_json(); throws std::runtime_error if it is none.
+    static MethodChoice from_json(const std::string& text);
+};
+
+/// The same settings. If their integrator is `auto`, it is replaced by a method that pilots choose, and `choice` is set.
+///
+/// The method is a function of the scene, the seed, the limits and the other settings that decide the image, but not of
+/// the number of threads or processes, the first pass, or any clock. The pilots have random numbers of their own: passes
+/// do not depend on them.
+RenderSettings with_chosen_method(const Scene& scene, const RenderSettings& settings);
+/// The same where an earlier rendering has chosen already. Throws std::runtime_error if it was asked for something else.
+RenderSettings with_chosen_method(const RenderSettings& settings, const MethodChoice& earlier);
+
+}  // namespace etendue

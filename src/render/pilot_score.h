@@ -1,0 +1,46 @@
+#pragma once
+// What pilot images of several methods say of the errors of whole renderings.
+//
+// All methods are rendered on the same small film, each in several independent images of equal cost. The predicted error
+// of a rendering of N such images is the mean over tiles of two parts, relative to µ² + 0.01 m² as in the errors of
+// `compare`; µ is the mean of the tile, and m that of the film.
+//
+// - Noise: the variance of an image between its pixels' values, divided by N. Of a difference d beyond V = µ max(16, N),
+//   only V |d| counts instead of d². Such a value would still stand out from the rendering as a spike: whether a pilot has
+//   met one is chance, and its square would decide the score. What counts is its energy, as if it were missing.
+// - Missing light: where the mean of a method certainly lies below that of another one, it lacks light that the other one
+//   has, and will find it in spikes. The lower limit δ of the difference counts V δ, like the energy of spikes that were
+//   met. It is looked for in tiles, in groups of them, and in the whole film; the level with the largest sum counts. The
+//   limits of two methods hold with a probability of 99 % in all tiles of a level.
+//
+// The images of chains are those of independent chains, so that the disagreement of chains is their noise. It depends on
+// the size of pixels: states that follow each other are near each other, in one large pixel, but in several small ones. If
+// the noise of neighbouring pixels were independent, the variance of the mean of four would be a quarter; where it is f
+// times that, each division of a pixel's area by four is taken to divide the variance of chains by f, down to that of
+// independent states.
+
+#include <span>
+#include <vector>
+
+namespace etendue {
+
+/// Independent images of one method, row by row.
+struct PilotImages {
+    std::vector<std::vector<float>> images;
+    double horizon = 1;  ///< N, the number of such images that the whole rendering is worth.
+    /// Of chains: the number of pixels of the rendering in one of the pilot, at least 1. Of other methods 1, since their
+    /// samples are independent.
+    double pixels_in_one = 1;
+    double least_variance =
+        0;  ///< Of a pixel of an image of chains, relative, if its states were independent.
+};
+
+struct PilotScore {
+    double noise = 0, missing = 0;
+    double error() const { return noise + missing; }
+};
+
+/// The scores of methods, each with two images or more, on a film of this size.
+std::vector<PilotScore> score_pilots(std::span<const PilotImages> methods, int width, int height);
+
+}  // namespace etendue
