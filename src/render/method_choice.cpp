@@ -287,8 +287,9 @@ private:
                 c.start_seconds = start_seconds(contenders_[i], p, width * height);
                 contenders_[i].start_a_pixel = p.start_seconds / (double(width) * double(height));
                 const double image = double(p.passes_per_image) * p.pass_seconds * ratio;
+                // If there is no time left after the start, the method is hopeless.
                 p.images.horizon =
-                    std::max(1.0, (budget_ - c.start_seconds) / std::max(image, 1e-12));
+                    std::max(0.01, (budget_ - c.start_seconds) / std::max(image, 1e-12));
                 p.images.pixels_in_one = p.has_chains ? ratio : 1;
                 found.push_back(c);
             }
