@@ -20,6 +20,7 @@
 #include "path_lengths.h"
 #include "render/render_request.h"
 #include "scene_options.h"
+#include "system/failure.h"
 #include "system/output_file.h"
 #include "verify/reference_image.h"
 #include "verify/report_json.h"
@@ -266,7 +267,9 @@ void VerifyCommand::run() {
     if (report.methods.empty())
         throw std::runtime_error("interrupted before the first comparison: nothing was written");
     // The file first, since standard output may have gone.
-    if (!json.empty()) write_file(json, json_text(to_json(report, s, options)));
+    const std::string not_written = failure_of([&] {
+        if (!json.empty()) write_file(json, json_text(to_json(report, s, options)));
+    });
     print_warnings(report.warnings);
     if (report.interrupted)
         message("warning: interrupted; what follows is based on the renderings until then\n");
@@ -276,6 +279,7 @@ void VerifyCommand::run() {
         if (m.estimator == Estimator::Unbiased && report.verdict(m) == Verdict::Deviates)
             rejected.push_back(m.method);
     std::vector<std::string> failures = report.failures;
+    if (!not_written.empty()) failures.push_back(not_written);
     if (!rejected.empty())
         failures.push_back(
             fmt::format("claimed to be unbiased, but rejected: {}", fmt::join(rejected, ", ")));
