@@ -84,7 +84,7 @@ def dielectric(ior: float, roughness: dict[str, Any], reflected: Value = 1.0, tr
 
 
 def glass_gain(ior: float, roughness: Value, node: Output) -> float:
-    """The factor of rough glass with which it loses no light on average, for the distribution Multiscatter GGX."""
+    """The factor with which rough glass loses no light from outside, for the distribution Multiscatter GGX."""
     if not scatters_again(roughness, node):
         return 1.0
     return 1 / sum(microfacets(roughness**2, max(ior, 1 / ior))[:2])

@@ -21,6 +21,7 @@
 #include "path_lengths.h"
 #include "render/render_request.h"
 #include "scene_options.h"
+#include "system/failure.h"
 #include "system/output_file.h"
 #include "usage_error.h"
 #include "verify/image_series.h"
@@ -310,7 +311,9 @@ void VerifyCommand::run() {
     if (report.methods.empty())
         throw std::runtime_error("interrupted before the first comparison: nothing was written");
     // The file first, since standard output may have gone.
-    if (!json.empty()) write_file(json, json_text(to_json(report, s, options)));
+    const std::string not_written = failure_of([&] {
+        if (!json.empty()) write_file(json, json_text(to_json(report, s, options)));
+    });
     print_warnings(report.warnings);
     if (report.interrupted)
         message("warning: interrupted; what follows is based on the renderings until then\n");
@@ -320,6 +323,7 @@ void VerifyCommand::run() {
         if (m.estimator == Estimator::Unbiased && report.verdict(m) == Verdict::Deviates)
             rejected.push_back(m.method);
     std::vector<std::string> failures = report.failures;
+    if (!not_written.empty()) failures.push_back(not_written);
     if (!rejected.empty())
         failures.push_back(
             fmt::format("claimed to be unbiased, but rejected: {}", fmt::join(rejected, ", ")));

@@ -80,7 +80,7 @@ def denoise(image: Any, albedo: ImageLike | None = None, normal: ImageLike | Non
     normal: normals, in [-1, 1], such as the auxiliary image denoise_normal; only with albedo.
     threads: number of threads; 0 for one per core. A Result is denoised by as many as rendered it.
 
-    Raises RuntimeError if there is no library: `pip install etendue[denoise]` installs it, or ETENDUE_OIDN names it. Raises
+    Raises RuntimeError if there is no library: `pip install pyoidn` installs it, or ETENDUE_OIDN names it. Raises
     ValueError if the sizes differ.
     """
     if hasattr(image, "denoised"):  # a Result

@@ -63,10 +63,10 @@ public:
     virtual bool sample_direct(Vec3 from, FinePoint u, DirectSample& out) const = 0;
     /// Whether sample_direct() reads tables that the processor's caches do not hold.
     virtual bool has_large_tables() const { return false; }
-    /// Asks for the memory that sample_direct() reads there for `u` at any point: of the search in the tables, or, once the
-    /// former has come, of its result.
-    enum class Tables : uint8_t { Search, Result };
-    virtual void prefetch_direct(FinePoint /*u*/, Tables /*part*/) const {}
+    /// Asks for the memory that sample_direct() reads there for `u` at any point, in two parts: of the search in the tables;
+    /// and once this has come, of its result, with what the first part returned.
+    virtual int prefetch_search(FinePoint /*u*/) const { return 0; }
+    virtual void prefetch_result(FinePoint /*u*/, int /*searched*/) const {}
     /// Emitted power in W, weighted by luminance; emitters are chosen proportionally to it.
     virtual double power() const = 0;
 

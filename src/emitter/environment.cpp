@@ -40,10 +40,10 @@ public:
         distribution_.for_each_large_array([](const auto& a) { prefer_huge_pages(a); });
     }
 
-    void prefetch_direct(FinePoint u, Tables part) const override {
-        if (part == Tables::Search) return distribution_.prefetch_row(u);
+    int prefetch_search(FinePoint u) const override { return distribution_.prefetch_row(u); }
+    void prefetch_result(FinePoint u, int y) const override {
         // The corners of a cell are the centres of four pixels.
-        const auto [x, y] = distribution_.cell(u);
+        const int x = distribution_.cell(u, y);
         for (const Rgb* above_or_below : {row(y - 1), row(y)}) {
             prefetch(above_or_below[x]);
             prefetch(above_or_below[wrap(x + 1)]);

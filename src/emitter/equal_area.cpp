@@ -28,10 +28,9 @@ public:
     }
 
     bool has_large_tables() const override { return true; }
-    void prefetch_direct(FinePoint u, Tables part) const override {
-        if (part == Tables::Search) return distribution_.prefetch_row(u);
-        const auto [x, y] = distribution_.cell(u);
-        prefetch(pixels_[size_t(y) * size_t(size_) + size_t(x)]);
+    int prefetch_search(FinePoint u) const override { return distribution_.prefetch_row(u); }
+    void prefetch_result(FinePoint u, int y) const override {
+        prefetch(pixels_[size_t(y) * size_t(size_) + size_t(distribution_.cell(u, y))]);
     }
     double power() const override {
         return 4 * std::numbers::pi * std::numbers::pi * sqr(double(scene_radius())) * mean_;

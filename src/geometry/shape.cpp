@@ -380,7 +380,7 @@ Bounds3 Cylinder::bounds() const {
 }
 
 double Cylinder::area() const {
-    return 2.0 * kPi * radius_ * height_;
+    return 2 * std::numbers::pi * radius_ * height_;
 }
 
 SurfaceGeometry Cylinder::surface(uint32_t, float u, float v, bool tangents) const {

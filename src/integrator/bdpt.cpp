@@ -32,6 +32,7 @@ void trace_further_light_paths(const Bidirectional& paths, const SampleContext& 
     if (c.is_of_whole_film) return;
     const uint64_t samples = c.film.sample_count();
     for (uint64_t path = c.index + samples; path < c.light_paths; path += samples) {
+        work.go_on();
         Sampler sampler = c.sampler;
         sampler.start(path);
         trace_light_path(paths, c.with(sampler, c.sink), n, work, learned);

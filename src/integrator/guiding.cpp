@@ -408,7 +408,8 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
             if (!for_roulette) continue;
             const Contributions c =
                 join_walks(walk, depth.max_depth, eye_walks, sampler, work.y, work.z);
-            blocks[b].light_contribution += double(c.by_light[0]);
+            // As in the records, one value that is not finite would be all that is learned.
+            if (c.by_light[0] < kInf) blocks[b].light_contribution += double(c.by_light[0]);
             record_contributions(work.y, TransportMode::Importance, options.max_vertices,
                                  c.by_light, {}, blocks[b].contributions);
             record_contributions(work.z, TransportMode::Radiance, options.max_vertices, c.by_eye,

@@ -14,6 +14,8 @@ namespace {
 
 /// Largest rr_depth of the pilot's walks. Without Russian roulette, walks would not end in a closed room.
 constexpr int kPilotRoulette = 10;
+/// The same of samples in which chains find their first states.
+constexpr int kFindingRoulette = 2;
 /// Longest time of the mutations of a pass, relative to that of its samples of direct light.
 constexpr double kLongest = 8;
 
@@ -43,7 +45,8 @@ MarkovIntegrator::MarkovIntegrator(const IntegratorParams& p, const DepthOptions
                .mutations = double(p.number("mutations", 0.0f, 1024.0f))},
       paths_(depth, kShortest), worth_(worth),
       direct_({std::min(depth.max_depth, kShortest - 1), depth.rr_depth}, 1),
-      pilot_paths_({depth.max_depth, std::min(depth.rr_depth, kPilotRoulette)}, kShortest) {
+      pilot_paths_({depth.max_depth, std::min(depth.rr_depth, kPilotRoulette)}, kShortest),
+      finding_paths_({depth.max_depth, std::min(depth.rr_depth, kFindingRoulette)}, kShortest) {
     if (options_.groups % 2 != 0)
         throw std::runtime_error(
             fmt::format("{}: groups must be even, but is {}", p.integrator(), options_.groups));
@@ -63,12 +66,26 @@ PrimarySample MarkovIntegrator::bidirectional_sample(const Scene& scene,
     };
 }
 
+namespace {
+
+/// Of the luminance of a join, by pixel: that of a part of the typical target of a state.
+std::vector<float> thresholds(const FilmGeometry& film, const Pilot& pilot) {
+    constexpr double kSmall = 0.1;
+    std::vector<float> out(film.pixel_count());
+    for (uint64_t i = 0; i < out.size(); ++i)
+        out[i] = float(kSmall * pilot.typical / pilot.map(film.pixel_center(i)));
+    return out;
+}
+
+}  // namespace
+
 void MarkovIntegrator::use_roulette(const FilmGeometry& film, const Pilot& pilot) {
-    constexpr double kSmall = 0.1;  // Part of the target of a state.
-    std::vector<float> thresholds(film.pixel_count());
-    for (uint64_t i = 0; i < thresholds.size(); ++i)
-        thresholds[i] = float(kSmall * pilot.typical / pilot.map(film.pixel_center(i)));
-    paths_.set_roulette(std::move(thresholds));
+    paths_.set_roulette(thresholds(film, pilot));
+}
+
+WeighedSample MarkovIntegrator::samples_of_paths(const Scene& scene, const Pilot& pilot) {
+    finding_paths_.set_roulette(thresholds(scene.film(), pilot));
+    return {bidirectional_sample(scene, finding_paths_), pilot.map};
 }
 
 void MarkovIntegrator::trace(const PassContext& pass) {

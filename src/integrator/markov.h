@@ -79,10 +79,9 @@ protected:
 
     /// A sample of all techniques of `bdpt`, with the walks of `paths`.
     PrimarySample bidirectional_sample(const Scene& scene, const Bidirectional& paths) const;
-    /// The same with the walks of the pilot, as the states of single paths that it consists of.
-    WeighedSample samples_of_paths(const Scene& scene, const Pilot& pilot) const {
-        return {bidirectional_sample(scene, pilot_paths_), pilot.map};
-    }
+    /// Samples of all techniques as states of the single paths of which they consist. Walks and joins have Russian roulette,
+    /// as in pssmlt, since most joins of long walks have a small part of the target.
+    WeighedSample samples_of_paths(const Scene& scene, const Pilot& pilot);
     /// Chains whose states are single paths, which are found by these samples.
     static Chains chains_of_paths(std::unique_ptr<StateSpace> space, std::vector<ClassPlan> plan,
                                   uint64_t pool) {
@@ -97,7 +96,7 @@ protected:
 private:
     /// Of states that are single paths: samples for each mutation, and what a large step, which tries one technique for one
     /// length, counts beside a sample of all.
-    static constexpr double kLaterSamples = 1.0 / 16, kLargeStep = 0.25;
+    static constexpr double kLaterSamples = 1.0 / 32, kLargeStep = 0.25;
 
     /// The counts for the shorter paths. Eye paths make all of them, unless an emitter has no extent.
     static TechniqueCounts direct_counts(const Scene& scene, uint64_t light_paths);
@@ -108,6 +107,7 @@ private:
     StepWorth worth_;
     Bidirectional direct_;
     Bidirectional pilot_paths_;  ///< With Russian roulette, even if the walks of chains have none.
+    Bidirectional finding_paths_;  ///< Of samples_of_paths().
     std::unique_ptr<StateSpace> space_;
     std::unique_ptr<ChainGroups> groups_;  ///< Set when the first pass starts.
     bool has_begun_ = false;  ///< Whether a pass was kept; until then each starts anew.

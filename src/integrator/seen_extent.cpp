@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "pathspace/walk.h"
+#include "sampler/pilot_seed.h"
 
 namespace etendue {
 namespace {
@@ -27,7 +28,7 @@ std::vector<SeenPoint> seen_points(const Scene& scene) {
     const TechniqueCounts counts;
     RenderStats stats;
     const WalkContext walk{scene, counts, stats, {kMostVertices, kMostVertices}};
-    Sampler sampler(SamplerKind::Independent, 0);
+    Sampler sampler(SamplerKind::Independent, pilot_seed(0, PilotUse::SeenExtent));
     SubPath z;
     std::vector<SeenPoint> points;
     for (int row = 0; row < kRays; ++row)

@@ -120,16 +120,14 @@ public:
         float pdf;
     };
     Sample sample(FinePoint u) const;
-    /// The cell that sample() falls in.
-    struct Cell {
-        int x, y;
-    };
-    Cell cell(FinePoint u) const {
-        const int y = row(u);
-        return {rows_.find(u.x, size_t(y)).cell, y};
+    /// The row of the cell that sample() falls in. Asks for the memory that cell() and sample() read of it.
+    int prefetch_row(FinePoint u) const {
+        const int y = marginal_.steps_.find(u.y, 0).cell;
+        prefetch(rows_.guide_of(u.x, size_t(y)));
+        return y;
     }
-    /// Asks for the memory that cell() and sample() read of the row.
-    void prefetch_row(FinePoint u) const { prefetch(rows_.guide_of(u.x, size_t(row(u)))); }
+    /// The number within its row of the cell that sample() falls in.
+    int cell(FinePoint u, int row) const { return rows_.find(u.x, size_t(row)).cell; }
     float pdf(Vec2 uv) const;
     double integral() const { return marginal_.integral(); }
     size_t memory_bytes() const { return rows_.memory_bytes() + marginal_.steps_.memory_bytes(); }
@@ -141,8 +139,6 @@ public:
     }
 
 private:
-    int row(FinePoint u) const { return marginal_.steps_.find(u.y, 0).cell; }
-
     PiecewiseConstant1D::Steps rows_;
     PiecewiseConstant1D marginal_;
 };

@@ -118,6 +118,7 @@ void Chain::advance(const ChainTerms& terms, double b, double scale, uint64_t ke
     };
     Shares of_x;  // Not yet added.
     for (uint64_t step = 0; step < count; ++step) {
+        c.work.go_on();
         const uint64_t step_key = hash_combine(key, step);
         const bool is_large = to_unit_double(hash_combine(step_key, 0)) < terms.p_large;
         if (!is_large && !is_started_) continue;

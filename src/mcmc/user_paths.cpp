@@ -480,7 +480,7 @@ double UserPaths::start_density(const UserPath& path, const Vertex& y0) const {
         length2(hit.geometry.p - y0.p) >
             sqr(std::max(kSame * path.radius, rounding_of({&y0.p, 1}))))
         return 0;
-    return double(abs_dot(n, y0.ng) / (kPi * sqr(path.radius)));
+    return double(abs_dot(n, y0.ng)) / (std::numbers::pi * sqr(double(path.radius)));
 }
 
 double UserPaths::step_density(const UserPath& path, int j, const Vertex& from, const Vertex& to) {

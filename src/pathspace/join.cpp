@@ -1,5 +1,8 @@
 #include "pathspace/join.h"
 
+#include <algorithm>
+#include <array>
+
 #include "math/rotated.h"
 
 namespace etendue {
@@ -79,14 +82,21 @@ EmitterChoice choose_emitter(const Scene& scene, int last, Sampler& sampler, uin
 void prefetch_next_events(const Scene& scene, std::span<const WalkInTurn> walks) {
     if (!scene.has_large_emitter_tables() || !scene.has_emitters()) return;
     // Later ones would displace those of the first vertices before they are read.
-    constexpr int kMostVertices = 8;
-    for (const auto part : {Emitter::Tables::Search, Emitter::Tables::Result})
-        for (const WalkInTurn& w : walks)
-            for (int i = 1; i < std::min(w.path->size(), kMostVertices); ++i) {
-                if (!(*w.path)[i].is_connectible) continue;
-                const EmitterChoice chosen = choose_emitter(scene, i, *w.sampler, 0);
-                chosen.emitter->prefetch_direct(chosen.u, part);
-            }
+    constexpr size_t kMostVertices = 8;
+    struct Search {
+        EmitterChoice chosen;
+        int searched;
+    };
+    std::array<Search, kWalksInTurn * kMostVertices> searches;
+    size_t count = 0;
+    for (const WalkInTurn& w : walks)
+        for (int i = 1; i < std::min(w.path->size(), int(kMostVertices)); ++i) {
+            if (!(*w.path)[i].is_connectible) continue;
+            const EmitterChoice chosen = choose_emitter(scene, i, *w.sampler, 0);
+            searches[count++] = {chosen, chosen.emitter->prefetch_search(chosen.u)};
+        }
+    for (const Search& s : std::span(searches.data(), count))
+        s.chosen.emitter->prefetch_result(s.chosen.u, s.searched);
 }
 
 std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t, Sampler& sampler,

@@ -1,6 +1,7 @@
 #pragma once
 // Contexts of samples and of passes: sub-paths, random numbers, and the destination of contributions.
 
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <vector>
@@ -21,6 +22,9 @@ public:
     virtual void load(LearnedState& from) = 0;
 };
 
+/// Ends a pass that is to be discarded.
+struct PassDropped {};
+
 /// Buffers of one worker, reused from sample to sample.
 struct Workspace {
     SubPath y, z;
@@ -32,6 +36,13 @@ struct Workspace {
         false;  ///< Whether whole sub-paths must be restored, for a ContributionObserver.
     RenderStats stats;
     std::unique_ptr<PassSums> sums;  ///< Of the type of the integrator.
+    const std::atomic<bool>* drop =
+        nullptr;  ///< Whether the pass is to be discarded; nullptr: never.
+
+    /// Throws PassDropped if the pass is to be discarded. What makes many paths for one sample calls it again and again.
+    void go_on() const {
+        if (drop && drop->load(std::memory_order_relaxed)) throw PassDropped();
+    }
 };
 
 /// One sample: an eye path, a light path, or both.

@@ -224,7 +224,8 @@ private:
     /// Pilots of all contenders on a film of so many pixels. Returns false, and leaves the candidates as they were, if there
     /// is no time for all of them; at first there need only be time for two.
     bool try_all(double pixels, bool is_first) {
-        const auto [width, height] = size_of_pilot(scene_.film(), pixels);
+        const std::pair<int, int> size = size_of_pilot(scene_.film(), pixels);
+        const int width = size.first, height = size.second;
         const double passes = double(kReplicates * kPasses) * width * height;
         const auto cost_of = [&](const Contender& c) {
             for (const auto& k : candidates_)

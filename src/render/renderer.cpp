@@ -118,7 +118,11 @@ public:
         queue_[waiting_++] = {film, value};
     }
     void tell(const Join& join, Rgb contribution, float factor) override {
-        if (!to_.shown.contains(join.technique) || !is_finite(contribution)) return;
+        if (!to_.shown.contains(join.technique)) return;
+        if (!is_finite(contribution)) {
+            ++to_.work.stats.rejected;
+            return;
+        }
         if (!to_.shown.contains_all())
             to_.film.add_splat(join.film, contribution * (join.mis_weight * factor));
         const float share = to_.splat_scale * factor;
@@ -196,7 +200,6 @@ std::unique_ptr<tbb::global_control> allow_threads(int threads) {
 }
 
 /// Exception that ends a pass which is to be discarded.
-struct PassDropped {};
 
 /// Throws if several processes cannot render together.
 void check_ranks(const RenderSettings& settings, const Integrator& integrator) {
@@ -380,6 +383,7 @@ private:
     Workspace& workspace() const {
         Workspace& work = r_.workers_->spaces.local();
         work.is_observed = r_.settings_.observer != nullptr;
+        work.drop = &drop_;
         if (!work.sums) work.sums = r_.integrator_->make_sums();
         return work;
     }

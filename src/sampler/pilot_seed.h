@@ -17,6 +17,7 @@ enum class PilotUse : uint64_t {
     PhotonScale = 0x6d7073,         ///< The scale of the importance of photons.
     PhotonPilot = 0x6d7074,         ///< MetropolisPhotons::run_pilot()
     PhotonPaths = 0x6d70737061,     ///< Paths as states of photons.
+    SeenExtent = 0x7365656e,        ///< seen_extent()
 };
 
 /// The seed for a use in a rendering or pass with the given seed.

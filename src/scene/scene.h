@@ -153,7 +153,7 @@ public:
     const Emitter& emitter(uint32_t index) const { return *emitters()[index]; }
     bool has_emitters() const { return !selection_.empty(); }
     bool has_emitter_choice() const { return emitters().size() > 1; }
-    /// Whether an emitter has large tables, see Emitter::prefetch_direct().
+    /// Whether an emitter has large tables, see Emitter::has_large_tables().
     bool has_large_emitter_tables() const { return has_large_emitter_tables_; }
     /// Whether any emitter is delta.
     bool has_delta_emitters() const { return has_delta_emitters_; }

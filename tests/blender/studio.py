@@ -87,9 +87,9 @@ class Studio:
         bpy.ops.render.render(write_still=True)
         return et.read_image(file, layer)[..., :3]
 
-    def ratio(self):
-        """The mean of etendue's image divided by that of Cycles."""
-        ours, reference = self.render(), self.render("CYCLES")
+    def ratio(self, pixels=slice(None)):
+        """The mean of etendue's image divided by that of Cycles, in all pixels or some."""
+        ours, reference = self.render()[pixels], self.render("CYCLES")[pixels]
         assert reference.mean() > 1e-3
         return float(ours.mean() / reference.mean())
 

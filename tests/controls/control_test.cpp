@@ -117,9 +117,6 @@ std::vector<Planted> planted() {
         {"PdfOfSampling", softly_lit, "path", Techniques, 0, 256},
         {"PdfEverywhere", softly_lit, "path", Densities, Image | Lengths | Techniques | Weights,
          256},
-        // Every pass has a group of its own, that starts anew.
-        {"FindsOfAnyTechnique", softly_lit, "mmlt:chains=48,groups=64,mutations=0.25",
-         Image | Lengths, 0},
         {"PmfOfOneRecord", divided_room, by_paper, Image | Lengths, 0, 512},
         {"NoUniformShare", divided_room, by_paper + ",neighbours=1", Image | Lengths, 0, 512},
         {"UniformDenominator", divided_room, by_paper, Image | Lengths, 0, 512},

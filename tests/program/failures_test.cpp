@@ -149,6 +149,23 @@ TEST_F(FailuresTest, FullDisksAreNamedAndKeepTheOldImage) {
     EXPECT_EQ(hidden_files(), 0u);
 }
 
+/// What took hours is printed even if the file of the report cannot be written.
+TEST_F(FailuresTest, VerdictsAreToldWithoutTheirFile) {
+    const fs::path json = folder.path() / "report.json";
+    const ProgramResult r = run({"verify", scene, "--methods", "path", "--runs", "8", "--quiet",
+                                 "--resolution", "8x8", "--json", json},
+                                "ulimit -f 1;", "");
+    EXPECT_EQ(r.status, 1);
+    EXPECT_EQ(r.output, "");
+    EXPECT_NE(r.errors.find("report.json"), std::string::npos) << r.errors;
+    const ProgramResult told = run({"verify", scene, "--methods", "path", "--runs", "8",
+                                    "--resolution", "8x8", "--json", json},
+                                   "ulimit -f 1;", "");
+    EXPECT_EQ(told.status, 1);
+    EXPECT_NE(told.output.find("path"), std::string::npos) << told.output;
+    EXPECT_NE(told.errors.find("report.json"), std::string::npos) << told.errors;
+}
+
 /// Messages name the file and the line of the scene that asks for it.
 TEST_F(FailuresTest, FilesThatCannotBeReadAreNamedWithTheirPlace) {
     const fs::path own = folder.path() / "own.xml", pbrt = folder.path() / "own.pbrt";

@@ -199,7 +199,8 @@ INSTANTIATE_TEST_SUITE_P(Quick, PhotonPower,
 INSTANTIATE_TEST_SUITE_P(Long, PhotonPower,
                          ::testing::Values(PowerCase{PhotonTarget::Importons, true},
                                            PowerCase{PhotonTarget::Path, false},
-                                           PowerCase{PhotonTarget::Importons, true, true}),
+                                           PowerCase{PhotonTarget::Importons, true, true},
+                                           PowerCase{PhotonTarget::Path, true, true}),
                          kName);
 
 }  // namespace

@@ -13,7 +13,7 @@ try:
     import pxr as _pxr  # noqa: F401
 except ImportError as _e:
     raise RuntimeError(
-        'USD files are read by the package usd-core: pip install "etendue[usd]", or pip install usd-core') from _e
+        "USD files are read by the package usd-core: pip install usd-core") from _e
 
 from ._cameras import add_camera
 from ._context import Context, Options

@@ -88,7 +88,8 @@ Scene white_room() {
 TEST(RenderLimits, PassesOfLongPathsAreDroppedAtOnce) {
     const Scene scene = white_room();
     for (const char* method :
-         {"path:rr_depth=1000", "bdpt:rr_depth=100,max_depth=1000000", "mlt"}) {
+         {"path:rr_depth=1000", "bdpt:rr_depth=100,max_depth=1000000",
+          "bdpt:light_paths=1000000000", "mlt", "mlt:chains=1,groups=2,mutations=1024"}) {
         RenderSettings settings;
         settings.integrator = IntegratorSpec::parse(method);
         settings.threads = 2;

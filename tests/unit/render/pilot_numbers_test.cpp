@@ -119,7 +119,7 @@ TEST(PilotNumbers, DifferByUse) {
         for (const PilotUse use :
              {PilotUse::OtherPaths, PilotUse::LightPathCount, PilotUse::Pairs, PilotUse::Guide,
               PilotUse::Chains, PilotUse::PhotonScale, PilotUse::PhotonPilot, PilotUse::PhotonPaths,
-              PilotUse::Choice}) {
+              PilotUse::SeenExtent, PilotUse::Choice}) {
             seeds.insert(pilot_seed(seed, use));
             ++count;
             EXPECT_NE(pilot_seed(seed, use), seed);
