@@ -195,6 +195,8 @@ public:
                              [&](const auto& k) { return k.method == c.method; }))
                 choice.candidates.push_back({.method = c.method});
         const std::string best = candidates_.empty() ? kWithoutPilots : candidates_.front().method;
+        std::stable_partition(choice.candidates.begin(), choice.candidates.end(),
+                              [&](const auto& k) { return k.method == best; });
         choice.chosen = spec_of(best, asked_).to_string();
         choice.budget = budget_;
         choice.pilots = spent_;

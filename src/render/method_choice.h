@@ -24,7 +24,7 @@ struct MethodChoice {
 
         double error() const { return noise + missing; }
     };
-    /// Those with the largest pilots first, and among them the best.
+    /// The one that renders first; then those with the largest pilots, and among them the best.
     std::vector<Candidate> candidates;
     double budget = 0;   ///< Simulated seconds of the rendering.
     double pilots = 0;   ///< Simulated seconds of the pilots.

@@ -276,7 +276,8 @@ async function showPixel() {
     };
     await describePixel(shown[0]);
     await describePixel(shown[1]);
-    if (isPixel && shown[0].run > 0) {
+    // The run may have been removed meanwhile.
+    if (isPixel && runs.has(shown[0].run)) {
         const {pixel} = await server.get(`/v1/worst?run=${shown[0].run}&x=${x}&y=${y}`).catch(() => ({pixel: null}));
         if (pixel) parts.push(element('div', {className: 'bar'}, [element('span', {className: 'soft', textContent: `brightest in pass ${pixel.pass}: ${percent(pixel.share)} of its sum`}),
             element('button', {type: 'button', id: 'trace-brightest', textContent: 'Trace it', onclick: () => { traceWorst(pixel); }})]));
