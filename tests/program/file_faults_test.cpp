@@ -120,7 +120,8 @@ TEST_F(FileFaults, AFileThatCannotBeClosedOrMovedInIsNotTaken) {
 
 /// The disk has room again a moment later.
 TEST_F(FileFaults, AfterAFailureTheNextCheckpointIsTriedInTime) {
-    const Arguments how = {"-i",   "path",        "--spp", "6", "--checkpoint-every",
+    // So many passes that there are several checkpoints, however long the first one takes.
+    const Arguments how = {"-i",   "path",        "--spp", "60", "--checkpoint-every",
                            "1e-6", "--checkpoint"};
     Arguments whole = how, faulty = how;
     fs::create_directory(path("faulty"));
