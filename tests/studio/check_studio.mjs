@@ -148,7 +148,10 @@ async function imagePart() {
         await browser.until("document.querySelector('#pixel').textContent.includes('10 × 5 pixels') && document.querySelector('#pixel table')?.textContent.includes('variance')", 'a rectangle by keys');
         await key(browser, 'Escape');
         check(await browser.evaluate('studio.view.corner === null'), 'Escape ends it');
-        const at = (u, v) => [x + w / 2 + (u - 0.5) * scale, y + h / 2 + (v - 0.5) * scale * 0.75];
+        // The view may have another size now, since other tools are shown.
+        const [left, top, width, height] = await box(browser, '#view');
+        const drawn = await browser.evaluate('studio.view.scale() * studio.view.width / devicePixelRatio');
+        const at = (u, v) => [left + width / 2 + (u - 0.5) * drawn, top + height / 2 + (v - 0.5) * drawn * 0.75];
         const corners = [at(0.3, 0.3), at(0.6, 0.7)];
         await browser.mouse('mousePressed', ...corners[0], {modifiers: 8});
         for (const f of [0, 0.5, 1]) await browser.mouse('mouseMoved', corners[0][0] + f * (corners[1][0] - corners[0][0]), corners[0][1] + f * (corners[1][1] - corners[0][1]) + 4, {modifiers: 8});
