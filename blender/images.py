@@ -9,7 +9,6 @@ import zlib
 from pathlib import Path
 from typing import Any
 
-import bpy
 import numpy as np
 
 from .report import Refused
@@ -60,7 +59,7 @@ class ImageFiles:
     def _on_disk(self, image: Any) -> str | None:
         if image.source != "FILE" or image.packed_file or image.is_dirty or not image.filepath:
             return None
-        file = Path(bpy.path.abspath(image.filepath, library=image.library))
+        file = Path(image.filepath_from_user())
         return str(file) if file.is_file() and file.suffix.lower() in _READABLE else None
 
     def _written(self, image: Any, where: str) -> str:
