@@ -101,6 +101,26 @@ double TriangleMesh::area() const {
 
 namespace {
 
+/// The root of a t² - 2 b t + c = 0 that is nearest to `near`; empty where there is none.
+std::optional<double> nearest_root(double a, double b, double c, double near) {
+    const double disc = b * b - a * c;
+    if (!(a > 0 && disc >= 0)) return {};
+    const double root = std::sqrt(disc), q = b < 0 ? b - root : b + root;
+    const double t0 = q / a, t1 = q != 0 ? c / q : t0;
+    return std::fabs(t0 - near) < std::fabs(t1 - near) ? t0 : t1;
+}
+
+/// A vector under the upper 3×3 part of `m`.
+Vec3d transformed(const Transform::Matrix& m, Vec3d v) {
+    return {m[0][0] * v.x + m[0][1] * v.y + m[0][2] * v.z,
+            m[1][0] * v.x + m[1][1] * v.y + m[1][2] * v.z,
+            m[2][0] * v.x + m[2][1] * v.y + m[2][2] * v.z};
+}
+/// Column `i` of `m`.
+Vec3d column(const Transform::Matrix& m, size_t i) {
+    return {m[0][i], m[1][i], m[2][i]};
+}
+
 /// A ray in the space of a shape.
 struct LocalRay {
     double o[3], d[3];
@@ -182,6 +202,33 @@ SurfaceGeometry TriangleMesh::surface(uint32_t prim, float u, float v, bool tang
         }
     }
     return g;
+}
+
+std::optional<SurfaceJet> TriangleMesh::jet(uint32_t prim, Vec3d o, Vec3d d, double) const {
+    const Face& face = faces_[prim];
+    const Vertex &a = vertices_[face.vertices[0]], &b = vertices_[face.vertices[1]],
+                 &c = vertices_[face.vertices[2]];
+    const Vec3d pa(a.p), e1 = Vec3d(b.p) - pa, e2 = Vec3d(c.p) - pa, n = cross(e1, e2);
+    const double slope = dot(d, n), n2 = dot(n, n);
+    if (slope == 0) return {};
+    const Vec3d p = o + d * (dot(pa - o, n) / slope);
+    SurfaceJet j{.p = p,
+                 .ng = n / std::sqrt(n2),
+                 .ns = {},
+                 .dpdu = e1,
+                 .dpdv = e2,
+                 .dnsdu = {},
+                 .dnsdv = {}};
+    j.ns = j.ng;
+    if (!has_normals_) return j;
+    const double u = dot(cross(p - pa, e2), n) / n2, v = dot(cross(e1, p - pa), n) / n2;
+    const Vec3d na(a.n), f1 = Vec3d(b.n) - na, f2 = Vec3d(c.n) - na, m = na + f1 * u + f2 * v;
+    const double size = length(m);
+    if (!(size > 0)) return j;
+    j.ns = m / size;
+    j.dnsdu = (f1 - j.ns * dot(j.ns, f1)) / size;
+    j.dnsdv = (f2 - j.ns * dot(j.ns, f2)) / size;
+    return j;
 }
 
 ShapeSample TriangleMesh::sample(uint32_t prim, Vec2 u) const {
@@ -284,6 +331,22 @@ SurfaceGeometry Sphere::surface(uint32_t, float u, float v, bool tangents) const
     return g;
 }
 
+std::optional<SurfaceJet> Sphere::jet(uint32_t, Vec3d o, Vec3d d, double near) const {
+    const Vec3d v = Vec3d(center_) - o;
+    const double r = double(radius_);
+    const auto t = nearest_root(dot(d, d), dot(v, d), dot(v, v) - r * r, near);
+    if (!t) return {};
+    const Vec3d n = (d * *t - v) / r;
+    const TangentBasis tangents(normalize(n));
+    return SurfaceJet{.p = o + d * *t,
+                      .ng = n,
+                      .ns = n,
+                      .dpdu = tangents.s * r,
+                      .dpdv = tangents.t * r,
+                      .dnsdu = tangents.s,
+                      .dnsdv = tangents.t};
+}
+
 ShapeSample Sphere::sample(uint32_t, Vec2 u) const {
     const Vec3 local = sample_uniform_sphere(u);
     const SurfaceGeometry g = at({local.x, local.y, local.z});
@@ -358,6 +421,21 @@ SurfaceGeometry Disk::surface(uint32_t, float u, float v, bool tangents) const {
     return g;
 }
 
+std::optional<SurfaceJet> Disk::jet(uint32_t, Vec3d o, Vec3d d, double) const {
+    const Transform::Matrix& m = to_world_.matrix();
+    const Vec3d e1 = column(m, 0), e2 = column(m, 1), n = cross(e1, e2);
+    const double slope = dot(d, n);
+    if (slope == 0) return {};
+    const Vec3d unit = normalize(n);
+    return SurfaceJet{.p = o + d * (dot(column(m, 3) - o, n) / slope),
+                      .ng = unit,
+                      .ns = unit,
+                      .dpdu = e1,
+                      .dpdv = e2,
+                      .dnsdu = {},
+                      .dnsdv = {}};
+}
+
 ShapeSample Disk::sample(uint32_t, Vec2 u) const {
     const Vec2 d = sample_uniform_disk(u);
     const Vec2 at{float(d.x - near_[0]), float(d.y - near_[1])};
@@ -429,6 +507,25 @@ SurfaceGeometry Cylinder::surface(uint32_t, float u, float v, bool tangents) con
         g.dpdv = to_world_.vector({0, 0, 1});
     }
     return g;
+}
+
+std::optional<SurfaceJet> Cylinder::jet(uint32_t, Vec3d o, Vec3d d, double near) const {
+    const Transform::Matrix &m = to_world_.matrix(), &inv = to_local_.matrix();
+    const Vec3d lo = transformed(inv, o) + column(inv, 3), ld = transformed(inv, d);
+    const auto t = nearest_root(ld.x * ld.x + ld.y * ld.y, -(lo.x * ld.x + lo.y * ld.y),
+                                lo.x * lo.x + lo.y * lo.y - 1, near);
+    if (!t) return {};
+    const double x = lo.x + *t * ld.x, y = lo.y + *t * ld.y;
+    // The transform has no shear, and scales x and y alike.
+    const Vec3d n = column(m, 0) * x + column(m, 1) * y, dn = column(m, 1) * x - column(m, 0) * y;
+    const double size = length(n);
+    return SurfaceJet{.p = o + d * *t,
+                      .ng = n / size,
+                      .ns = n / size,
+                      .dpdu = dn,
+                      .dpdv = column(m, 2),
+                      .dnsdu = dn / size,
+                      .dnsdv = {}};
 }
 
 ShapeSample Cylinder::sample(uint32_t, Vec2 u) const {

@@ -4,8 +4,10 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "geometry/surface_jet.h"
 #include "math/bounds.h"
 #include "math/prefetch.h"
 #include "math/transform.h"
@@ -46,6 +48,9 @@ public:
     virtual double primitive_area(uint32_t) const { return area(); }
     /// Geometry at parameters (u, v) of primitive `prim`, as in RayHit; dpdu and dpdv only if `tangents`.
     virtual SurfaceGeometry surface(uint32_t prim, float u, float v, bool tangents) const = 0;
+    /// Differential geometry where the line o + t·d meets `prim`, which extends beyond its edges: of several points the one
+    /// with t nearest to `near`. Empty where there is none.
+    virtual std::optional<SurfaceJet> jet(uint32_t prim, Vec3d o, Vec3d d, double near) const = 0;
     /// SurfaceGeometry::slack of the points of a primitive.
     virtual float slack(uint32_t) const { return 0; }
     /// Uniform in area on primitive `prim`.
@@ -91,6 +96,7 @@ public:
     double primitive_area(uint32_t prim) const override;
     /// (u, v) are the barycentric coordinates of the second and third vertex.
     SurfaceGeometry surface(uint32_t prim, float u, float v, bool tangents) const override;
+    std::optional<SurfaceJet> jet(uint32_t prim, Vec3d o, Vec3d d, double near) const override;
     float slack(uint32_t prim) const override { return faces_[prim].slack; }
     ShapeSample sample(uint32_t prim, Vec2 u) const override;
     size_t memory_bytes() const override;
@@ -142,6 +148,7 @@ public:
     Bounds3 bounds() const override;
     double area() const override;
     SurfaceGeometry surface(uint32_t, float u, float v, bool tangents) const override;
+    std::optional<SurfaceJet> jet(uint32_t, Vec3d o, Vec3d d, double near) const override;
     float slack(uint32_t) const override { return slack_; }
     ShapeSample sample(uint32_t, Vec2 u) const override;
     bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const override;
@@ -171,6 +178,7 @@ public:
     Bounds3 bounds() const override;
     double area() const override;
     SurfaceGeometry surface(uint32_t, float u, float v, bool tangents) const override;
+    std::optional<SurfaceJet> jet(uint32_t, Vec3d o, Vec3d d, double near) const override;
     ShapeSample sample(uint32_t, Vec2 u) const override;
     bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const override;
     Vec2 parameters(Vec3 local) const override;
@@ -193,6 +201,7 @@ public:
     Bounds3 bounds() const override;
     double area() const override;
     SurfaceGeometry surface(uint32_t, float u, float v, bool tangents) const override;
+    std::optional<SurfaceJet> jet(uint32_t, Vec3d o, Vec3d d, double near) const override;
     ShapeSample sample(uint32_t, Vec2 u) const override;
     bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const override;
     Vec2 parameters(Vec3 local) const override;

@@ -99,6 +99,40 @@ SurfaceGeometry Scene::surface(const SurfaceLocation& at) const {
     return g;
 }
 
+std::optional<SurfaceJet> Scene::jet(const SurfaceLocation& at, Vec3d o, Vec3d d,
+                                     double near) const {
+    const Shape& shape = *shapes_[at.shape].shape;
+    if (at.instance == kNoInstance) return shape.jet(at.prim, o, d, near);
+    const Transform& t = owned_->accelerator.instance(at.instance).to_world;
+    const auto mapped = [](const Transform::Matrix& m, Vec3d v, double w) -> Vec3d {
+        return {m[0][0] * v.x + m[0][1] * v.y + m[0][2] * v.z + w * m[0][3],
+                m[1][0] * v.x + m[1][1] * v.y + m[1][2] * v.z + w * m[1][3],
+                m[2][0] * v.x + m[2][1] * v.y + m[2][2] * v.z + w * m[2][3]};
+    };
+    const auto mapped_normal = [&](Vec3d n) -> Vec3d {
+        const Transform::Matrix& m = t.inverse_matrix();
+        return {m[0][0] * n.x + m[1][0] * n.y + m[2][0] * n.z,
+                m[0][1] * n.x + m[1][1] * n.y + m[2][1] * n.z,
+                m[0][2] * n.x + m[1][2] * n.y + m[2][2] * n.z};
+    };
+    // The parameter t of the line is the same in the space of the instance.
+    std::optional<SurfaceJet> j = shape.jet(at.prim, mapped(t.inverse_matrix(), o, 1),
+                                            mapped(t.inverse_matrix(), d, 0), near);
+    if (!j) return {};
+    j->p = mapped(t.matrix(), j->p, 1);
+    j->dpdu = mapped(t.matrix(), j->dpdu, 0);
+    j->dpdv = mapped(t.matrix(), j->dpdv, 0);
+    j->ng = normalize(mapped_normal(j->ng));
+    const Vec3d n = mapped_normal(j->ns);
+    const double size = length(n);
+    j->ns = n / size;
+    for (Vec3d* dn : {&j->dnsdu, &j->dnsdv}) {
+        const Vec3d v = mapped_normal(*dn);
+        *dn = (v - j->ns * dot(j->ns, v)) / size;
+    }
+    return j;
+}
+
 float Scene::opacity(const SurfaceLocation& at) const {
     return opacity_of(shapes_[at.shape], surface(at));
 }

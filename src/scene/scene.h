@@ -116,6 +116,9 @@ public:
     void prefetch_images(const SurfaceHit& hit) const;
     /// Geometry of a surface point.
     SurfaceGeometry surface(const SurfaceLocation& location) const;
+    /// Differential geometry where the line o + t·d meets the primitive at `location`, see Shape::jet().
+    std::optional<SurfaceJet> jet(const SurfaceLocation& location, Vec3d o, Vec3d d,
+                                  double near) const;
     /// Probability that a ray meets the surface there.
     float opacity(const SurfaceLocation& location) const;
     const SceneShape& shape(uint32_t index) const { return shapes_[index]; }

@@ -26,6 +26,7 @@ const char* name_of(Strategy strategy) {
     case Strategy::HitLens: return "hit lens";
     case Strategy::Merge: return "merge";
     case Strategy::Gather: return "gather";
+    case Strategy::Specular: return "specular";
     }
     return "";
 }

@@ -37,7 +37,7 @@ public:
     void observe(const Join& join, Rgb contribution, float share, const FilmTarget&,
                  const Workspace& paths) override {
         const Technique& q = join.technique;
-        const SubPath& y = is_pair(q.strategy) ? paths.pair : paths.y;
+        const SubPath& y = paths.light_side(q);
         lengths_[size_t(q.vertices() - 1)].emplace_back(
             shortest_edge(scene_, join, y, paths.z),
             double(luminance(contribution) * join.mis_weight * share));
