@@ -14,6 +14,7 @@
 #include "render/method_choice.h"
 #include "render/render_report.h"
 #include "render/render_request.h"
+#include "render/warnings.h"
 #include "session/run.h"
 #include "system/failure.h"
 #include "system/memory_limit.h"
@@ -245,6 +246,11 @@ void Session::make_renderer(Run& run) {
     if (is_auto(run.settings.integrator)) integrator = chosen_method(run);
     if (!integrator) integrator = make_integrator(run.settings.integrator);
     run.renderer = std::make_unique<Renderer>(run.scene(), run.settings, std::move(integrator));
+    {
+        std::vector<std::string> warnings = memory_warnings(*run.renderer);
+        const std::lock_guard lock(mutex_);
+        run.status.warnings = std::move(warnings);
+    }
     run.log = {};
     if (!folder_) return;
     run.conditions = conditions_of(*run.renderer, run.scene(), run.loaded->source, run.settings);
