@@ -525,6 +525,8 @@ def run(
     seconds_between: float = 0.0,
 ) -> Result:
     """Renders all passes. The callback is called between them, if the last call was at least seconds_between before."""
+    for text in rendering.memory_warnings:
+        warnings.warn(text, stacklevel=3)
     update_view: Callable[..., None] | None = None
     if live:
         from ._show import LiveView

@@ -579,6 +579,8 @@ void bind_render(nb::module_& m) {
         .def_prop_ro("integrator",
                      [](const Rendering& r) { return r.settings().integrator.to_string(); })
         .def_prop_ro("warnings", [](const Rendering& r) { return warnings(r.renderer().stats()); })
+        .def_prop_ro("memory_warnings",
+                     [](const Rendering& r) { return memory_warnings(r.renderer()); })
         .def("error",
              [](const Rendering& r) {
                  const nb::gil_scoped_release no_gil;

@@ -205,7 +205,9 @@ double error_of_mean(const Method& m) {
 std::vector<std::string> Method::warnings() const {
     RenderStats all;
     for (const Run& r : runs) all += r.stats;
-    return etendue::warnings(all);
+    std::vector<std::string> texts = etendue::warnings(all);
+    texts.insert(texts.end(), memory_warnings.begin(), memory_warnings.end());
+    return texts;
 }
 
 void check_methods(const std::vector<MethodSpec>& methods) {
@@ -304,6 +306,10 @@ Comparison compare(const Scene& scene, const Reference& reference, const Compare
             c.attempt([&] {
                 c.renderer = std::make_unique<Renderer>(
                     scene, render_settings(settings, settings.methods[i].integrator, seed));
+                if (index > 0) return;
+                out.methods[i].memory_warnings = memory_warnings(*c.renderer);
+                for (const std::string& w : out.methods[i].memory_warnings)
+                    progress(fmt::format("{}: {}", out.methods[i].name(), w));
             });
             c.memory.end();
         }

@@ -63,12 +63,13 @@ struct Method {
     std::vector<Rgb> image;
     std::vector<float> flip_map;
     double flip = 0;
-    size_t peak_bytes = 0;  ///< See MemoryMeter.
+    size_t peak_bytes = 0;                     ///< See MemoryMeter.
+    std::vector<std::string> memory_warnings;  ///< See render/warnings.h.
     std::vector<TechniqueImages::Entry> techniques;
     uint64_t technique_spp = 0;
 
     const std::string& name() const { return spec.name; }
-    /// See render/warnings.h; of all runs.
+    /// See render/warnings.h; of all runs, and of the memory that they need.
     std::vector<std::string> warnings() const;
 };
 

@@ -14,6 +14,7 @@
 #include "render/method_choice.h"
 #include "render/render_report.h"
 #include "render/render_request.h"
+#include "render/warnings.h"
 #include "session/run.h"
 #include "system/failure.h"
 #include "system/memory_limit.h"
@@ -248,6 +249,11 @@ void Session::make_renderer(Run& run) {
     // The pilots of a series are part of the time of its first seed.
     if (run.seeds.count() > 0) own.choice = nullptr;
     run.renderer = std::make_unique<Renderer>(run.scene(), own, std::move(integrator));
+    {
+        std::vector<std::string> warnings = memory_warnings(*run.renderer);
+        const std::lock_guard lock(mutex_);
+        run.status.warnings = std::move(warnings);
+    }
     run.log = {};
     if (!folder_) return;
     run.conditions = conditions_of(*run.renderer, run.scene(), run.loaded->source, run.settings);

@@ -26,6 +26,7 @@ const char* name_of(Strategy strategy) {
     case Strategy::HitLens: return "hit lens";
     case Strategy::Merge: return "merge";
     case Strategy::Gather: return "gather";
+    case Strategy::Specular: return "specular";
     }
     return "";
 }
@@ -93,6 +94,7 @@ json to_json(const RunStatus& s) {
         j["auto"]["message"] = s.choice->message();
     }
     j["why_look_only"] = s.why_look_only;
+    j["warnings"] = s.warnings;
     j["sampler"] = to_string(s.request.sampler);
     j["filter_mode"] = to_string(s.request.filter_mode);
     j["seed"] = s.request.seed;

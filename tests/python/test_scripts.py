@@ -98,3 +98,66 @@ def test_dead_links_of_the_manual_are_found(tmp_path: Path, line: str, dead: str
     result = subprocess.run([sys.executable, tmp_path / "scripts" / "links"], capture_output=True, text=True)
     assert result.returncode == (1 if dead else 0), result.stderr
     assert (f": {dead}\n" in result.stderr) if dead else result.stderr == ""
+
+
+def copy_of_script(folder: Path, name: str) -> Path:
+    """A script of the project in another folder, whose other programs are stand-ins that do nothing."""
+    for other in ("build", "links"):
+        write_program(folder / "scripts" / other, "")
+    script = folder / "scripts" / name
+    script.write_bytes((ROOT / "scripts" / name).read_bytes())
+    script.chmod(0o755)
+    return script
+
+
+def test_pages_lose_no_text(tmp_path: Path) -> None:
+    script = copy_of_script(tmp_path, "docs")
+    (tmp_path / "README.md").write_text("no generated part\n")
+    (tmp_path / "docs").mkdir()
+    page = tmp_path / "docs" / "page.md"
+    end = "<!-- end of generated part -->\n"
+    text = "before\n<!-- generated from code.cpp -->\n```cpp\nold\n```\n" + end + "after, without an end of the line"
+    page.write_text(text)
+    page.chmod(0o640)
+    run = subprocess.run([script], capture_output=True, text=True)
+    assert run.returncode != 0 and "code.cpp" in run.stderr
+    assert page.read_text() == text
+    (tmp_path / "code.cpp").write_text("int new_one;\n")
+    subprocess.run([script], check=True, capture_output=True)
+    assert page.read_text() == text.replace("old", "int new_one;") + "\n"
+    assert page.stat().st_mode & 0o777 == 0o640
+    assert [f.name for f in (tmp_path / "docs").iterdir()] == ["page.md"]
+
+
+def test_a_folder_that_is_no_site_is_not_deleted(tmp_path: Path) -> None:
+    script = copy_of_script(tmp_path, "site")
+    (tmp_path / "scripts" / "site-requirements.txt").write_text("")
+    (tmp_path / "build" / "site-venv").mkdir(parents=True)
+    write_program(tmp_path / "build" / "site-venv" / "bin" / "mkdocs", 'rm -rf "${@: -1}"/*')
+    write_program(tmp_path / "build" / "site-venv" / "bin" / "python", "")
+    (tmp_path / "build" / "site-venv" / "requirements.txt").write_text("")
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / "thesis.tex").write_text("ten years")
+    run = subprocess.run([script, folder], capture_output=True, text=True)
+    assert run.returncode != 0 and "neither empty nor a site" in run.stderr
+    assert (folder / "thesis.tex").exists()
+    (folder / "sitemap.xml").write_text("")
+    subprocess.run([script, folder], check=True, capture_output=True)
+    assert not (folder / "thesis.tex").exists()
+
+
+def test_pages_of_the_site_load_nothing_from_elsewhere(tmp_path: Path) -> None:
+    def problems(html: str, name: str = "index.html") -> str:
+        (tmp_path / name).write_text(html)
+        return subprocess.run([ROOT / "scripts" / "links", "--site", tmp_path], capture_output=True, text=True).stderr
+
+    (tmp_path / "own.js").write_text("")
+    own = '<script src="own.js"></script><a href="https://a.example/">a</a><link rel="canonical" href="https://a.example/">' \
+        '<img src="data:image/png;base64,AA==">'
+    assert problems(own) == ""
+    for loaded in ('<script src="https://a.example/x.js"></script>', '<link rel="stylesheet" href="//a.example/x.css">',
+                   '<img src="http://a.example/x.png">', '<img srcset="own.js 1x, https://a.example/x.png 2x">'):
+        assert "from another site" in problems(own + loaded), loaded
+    assert problems(own) == ""
+    assert "404.html: this is loaded from another site" in problems('<script src="https://a.example/x.js"></script>', "404.html")
