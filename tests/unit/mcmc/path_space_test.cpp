@@ -463,9 +463,10 @@ TEST_P(Paths, MutationsKeepDetailedBalance) {
         const bool is_rare = std::find(rare.begin(), rare.end(), kind) != rare.end();
         const bool is_common = kind <= PathMutations::Caustic || kind >= PathMutations::LensSubpath;
         const uint64_t wanted = is_rare || is_common ? kMoves : kFewMoves;
+        const uint64_t enough = is_rare ? 400000 : 60000;
         for (uint64_t i = 0; i < 600000; ++i) {
-            // Until here, a mutation that suits some paths of the scene has made a move.
-            if (i >= 60000 && (flows.moves() == 0 || flows.moves() >= wanted)) break;
+            // By then, a mutation that suits some paths of the scene has made a move.
+            if (i >= enough && (flows.moves() == 0 || flows.moves() >= wanted)) break;
             space->draw(0, hash_combine(5, i), c, *x);
             if (!(x->target > 0)) continue;
             const Proposal p = space->propose(0, *x, hash_combine(6, i), c, *y);
