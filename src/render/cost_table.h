@@ -9,6 +9,7 @@ namespace etendue {
 
 /// Seconds that one thread of a usual machine takes for what `stats` has counted of a method, in a scene of middle size. In
 /// one scene, methods are to each other as these figures are, within about a fifth.
+/// `is_guided`: whether a guide chooses directions at surfaces.
 double simulated_seconds(const std::string& method, bool is_guided, const RenderStats& stats);
 /// Cost of a sample relative to one of the same method without guide.
 double guided_factor(bool is_guided);

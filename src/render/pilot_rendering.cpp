@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "guide/guide.h"
 #include "render/cost_table.h"
 #include "sampler/pilot_seed.h"
 
@@ -65,14 +66,15 @@ void add_replicate(const Scene& small, RenderSettings settings, uint64_t number,
     // What methods learn, they learn before the first pass and after it. Chains begin in the first pass of their group.
     const uint64_t first = renderer.integrator().is_learning() ? 1 : 0,
                    costs_from = groups > 0 ? uint64_t(groups) : first;
+    const Guide* guide = settings.integrator.guide.get();
+    const bool is_guided = guide && guide->guides_surfaces();
     ReplicateImages made(groups, first);
     double seconds = 0, first_seconds = 0;
     const StopReason reason = renderer.run(
         settings,
         [&](const Progress& p) {
             made.add(renderer.film(), p.passes - 1);
-            seconds = simulated_seconds(settings.integrator.name,
-                                        settings.integrator.guide != nullptr, renderer.stats());
+            seconds = simulated_seconds(settings.integrator.name, is_guided, renderer.stats());
             if (p.passes == costs_from) first_seconds = seconds;
         },
         drop, drop);
