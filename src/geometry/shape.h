@@ -132,6 +132,8 @@ public:
     virtual bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const = 0;
     /// The parameters (u, v) of a hit. Candidates that are not the nearest hit, and shadow rays, do not need them.
     virtual Vec2 parameters(Vec3 local) const = 0;
+    /// The parameters of a point of a grid over the shape: the unit square covers the shape once.
+    virtual Vec2 grid_parameters(Vec2 in_square) const { return in_square; }
 };
 
 /// Sphere with (u, v) = (azimuth over 2π, polar angle over π) about the axis from its centre through the origin: so
@@ -167,7 +169,8 @@ private:
     bool flip_;
 };
 
-/// Affine image of the unit disc in the xy plane with normal +z; (u, v) = (radius, azimuth over 2π).
+/// Affine image of the unit disc in the xy plane with normal +z; texture coordinates (radius, azimuth over 2π). The
+/// parameters (u, v) are the disc's own x and y, relative to the disc's point nearest to the origin: see Sphere.
 class Disk final : public AnalyticShape {
 public:
     Disk(const Transform& to_world, bool flip_normals);
@@ -179,14 +182,17 @@ public:
     ShapeSample sample(uint32_t, Vec2 u) const override;
     bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const override;
     Vec2 parameters(Vec3 local) const override;
+    Vec2 grid_parameters(Vec2 in_square) const override;
 
 private:
     Transform to_world_, to_local_;
+    std::array<double, 2> near_;  ///< Own coordinates of the point nearest to the origin.
     Vec3 ng_;
 };
 
-/// Open cylinder from p0 to p1 under a transform without shear; normals point outward; (u, v) = (azimuth over 2π,
-/// height over length).
+/// Open cylinder from p0 to p1 under a transform without shear; normals point outward; texture coordinates (azimuth
+/// over 2π, height over length). The parameters (u, v) are the same, relative to the cylinder's point nearest to the
+/// origin: see Sphere.
 class Cylinder final : public AnalyticShape {
 public:
     /// `to_world` maps the unit cylinder about +z (radius 1, z in [0, 1]) to the world.
@@ -199,9 +205,11 @@ public:
     ShapeSample sample(uint32_t, Vec2 u) const override;
     bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const override;
     Vec2 parameters(Vec3 local) const override;
+    Vec2 grid_parameters(Vec2 in_square) const override;
 
 private:
     Transform to_world_, to_local_;
+    std::array<double, 3> near_;  ///< Own coordinates of the point nearest to the origin.
     float radius_, height_;
     bool flip_;
 };

@@ -163,23 +163,30 @@ void Scene::complete(SurfaceHit& hit) const {
 }
 
 template <class Stops, class Passes>
-Ray Scene::for_each_surface(Ray ray, const Stops& stops, const Passes& passes) const {
+float Scene::for_each_surface(Ray ray, const Stops& stops, const Passes& passes) const {
+    const bool is_segment = ray.tmax < kInf;
+    const Vec3 end = is_segment ? ray.o + ray.d * ray.tmax : Vec3();
     SurfaceHit hit;
-    const float length_d = length(ray.d);
+    float length_d = length(ray.d);
     float skipped =
         0;  // distance from the last surface to the ray's origin, which is offset from it
+    const auto rest = [&] { return ray.tmax * length_d + skipped; };
     while (ray.tmax > 0 && locate(ray, hit)) {
         hit.t = hit.t * length_d + skipped;
-        if (stops(hit)) return ray;
+        if (stops(hit)) return rest();
         complete(hit);
-        if (!passes(hit)) return ray;
+        if (!passes(hit)) return rest();
         const Vec3 p = hit.geometry.p, o = offset_origin(ray_end(hit.geometry), ray.d);
         skipped = dot(o - p, ray.d) / length_d;
-        ray.tmax -= dot(o - ray.o, ray.d) / sqr(length_d);
         ray.o = o;
+        if (!is_segment) continue;
+        // The offsets are aside of the ray. Its end lies so near to a surface that it must stay where it is.
+        const Vec3 to_end = end - o;
+        ray.tmax = dot(to_end, ray.d) > 0 ? 1.0f : 0.0f;
+        ray.d = to_end;
+        length_d = length(to_end);
     }
-    ray.tmax += skipped / length_d;
-    return ray;
+    return rest();
 }
 
 bool Scene::intersect(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const {
@@ -253,7 +260,7 @@ float Scene::masked_transmittance(const Ray& ray) const {
 
 Rgb Scene::attenuation(MediumId medium, const Ray& ray) const {
     Rgb product(1);
-    const Ray rest = for_each_surface(
+    const float rest = for_each_surface(
         ray,
         [&](const SurfaceHit& hit) {
             product *= attenuation(medium, hit.t);
@@ -263,7 +270,7 @@ Rgb Scene::attenuation(MediumId medium, const Ray& ray) const {
             medium = medium_beyond(hit, ray.d, medium);
             return true;
         });
-    return product * attenuation(medium, std::max(0.0f, rest.tmax) * length(ray.d));
+    return product * attenuation(medium, std::max(0.0f, rest));
 }
 
 /// A shadow ray from `a` to `b` with parameters in [0, 1]; both ends are moved off their surfaces.

@@ -218,10 +218,10 @@ private:
     float masked_transmittance(const Ray& ray) const;
     Rgb attenuation(MediumId medium, const Ray& ray) const;
     /// For the surfaces along a ray in order: calls `stops(hit)` without the geometry, and unless that returns true,
-    /// `passes(hit)` with it, until that returns false or there are no more surfaces; returns the rest of the ray. `hit.t`
-    /// is the distance from the previous surface.
+    /// `passes(hit)` with it, until that returns false or there are no more surfaces; returns the length of the rest of the
+    /// ray. `hit.t` is the distance from the previous surface.
     template <class Stops, class Passes>
-    Ray for_each_surface(Ray ray, const Stops& stops, const Passes& passes) const;
+    float for_each_surface(Ray ray, const Stops& stops, const Passes& passes) const;
 
     std::string file_;
     std::shared_ptr<Owned> owned_;
