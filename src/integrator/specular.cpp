@@ -20,7 +20,7 @@ Specular::Specular(const IntegratorParams& p) {
 void Specular::add(const SampleContext& c, int t, int max_depth, const TechniqueCounts& counts,
                    Workspace& work) const {
     if (!is_on()) return;
-    constexpr float kThreshold = 0.1f;  // of the pixel's luminance
+    constexpr float kThreshold = 0.15f;  // of the luminance of the pixel
     const SpecularLimits limits{max_depth, kThreshold * c.expected_of_pixel()};
     if (const auto j = join_specular(c.scene, work.z, t, limits, c.sampler, counts, work))
         c.sink.add(*j, j->contribution);

@@ -25,6 +25,7 @@ bool ChainTracer::advance() {
     vertex_.set_surface(*hit_.shape, hit_.location, hit_.geometry, -d, arena_);
     vertex_.medium = passage.medium;
     if (!vertex_.bsdf.has_delta()) return false;
+    if (ray_.way == 0) first_ = vertex_.ray_end();
     ray_.arrive(jet_);
     value_ *= passage.attenuation;
     return true;
@@ -51,12 +52,12 @@ bool ChainTracer::follow(Vec3d w, const ChainEvents& events) {
     return true;
 }
 
-std::optional<Vec3d> ChainTracer::solve(Vec3d w, const ChainEvents& events, const LampPoint& lamp) {
+std::optional<Vec3d> ChainTracer::solve(Vec3d w, const ChainEvents& events, const ChainRay& ray,
+                                        const LampPoint& lamp) {
     constexpr int kMostRays = 30;          // through the whole chain
     constexpr double kLongestStep = 0.25;  // radians
     constexpr double kLeastShare = 1.0 / 64;
-    if (!follow(w, events)) return {};
-    Passing at = lamp.passed_by(ray_);
+    Passing at = lamp.passed_by(ray);
     double share = 1;  // of the step
     for (int i = 1; i < kMostRays; ++i) {
         if (!(at.distance > 0)) return {};
@@ -70,7 +71,7 @@ std::optional<Vec3d> ChainTracer::solve(Vec3d w, const ChainEvents& events, cons
         const Vec3d next = normalize(w + basis.s * a + basis.t * b);
         const bool is_last = at.miss() < kMissOfSolutions;
         const bool follows = follow(next, events);
-        if (is_last) return follows ? next : w;
+        if (is_last) return follows ? std::optional(next) : std::nullopt;
         const Passing there = follows ? lamp.passed_by(ray_) : at;
         if (follows && there.distance > 0 && there.miss() < at.miss()) {
             w = next;

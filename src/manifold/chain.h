@@ -71,6 +71,8 @@ public:
     bool leave(uint8_t event);
 
     const Vertex& vertex() const { return vertex_; }
+    /// The first surface that the present ray has met.
+    RayEnd first() const { return first_; }
     const ChainRay& ray() const { return ray_; }
     /// Of the ray that left the last surface.
     RayEnd origin() const { return origin_; }
@@ -80,9 +82,11 @@ public:
 
     /// start(), and all events; false where one of them is not met.
     bool follow(Vec3d w, const ChainEvents& events);
-    /// The direction near `w` whose ray passes through the lamp's point, behind the events. It is a function of its arguments:
-    /// found by one seed, it is found again by the same one.
-    std::optional<Vec3d> solve(Vec3d w, const ChainEvents& events, const LampPoint& lamp);
+    /// The direction near `w` whose ray passes through the lamp's point, behind the events; the tracer has followed it then. It is
+    /// a function of its arguments: found by one seed, it is found again by the same one. `ray`: that along w, behind the
+    /// events.
+    std::optional<Vec3d> solve(Vec3d w, const ChainEvents& events, const ChainRay& ray,
+                               const LampPoint& lamp);
     /// Transmittance of the edge from the last surface to the lamp, where the ray passes through its point: of masks, and
     /// of the medium. 0 where it is blocked.
     Rgb transmittance_to(const LampPoint& lamp) const;
@@ -95,7 +99,7 @@ private:
     const Vertex& from_;
     RenderStats& stats_;
     ChainRay ray_;
-    RayEnd origin_;
+    RayEnd first_, origin_;
     MediumId medium_ = kVacuum;
     Rgb value_;
     SurfaceHit hit_;

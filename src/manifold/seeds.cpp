@@ -59,13 +59,12 @@ std::optional<ChainSeed> ChainSeeds::draw(Sampler& sampler, const ChainEvents* o
     if (!w || from_.eval_unguided(to_float(*w), TransportMode::Radiance).f.is_zero()) return {};
     struct End {
         int events;
+        ChainRay ray;
         Rgb guess;
     };
     std::array<End, ChainEvents::kMost> ends;
     size_t count = 0;
-    ChainSeed seed{.w = *w, .events = {}, .guess = {}};
-    double way = 0;
-    Vec3d last(from_.p);
+    ChainSeed seed{.w = *w, .events = {}, .ray = {}, .guess = {}};
     tracer_.start(*w);
     for (int i = 0; i < depth_ && tracer_.advance(); ++i) {
         const Vertex& v = tracer_.vertex();
@@ -74,17 +73,16 @@ std::optional<ChainSeed> ChainSeeds::draw(Sampler& sampler, const ChainEvents* o
         if (!s || !s->is_delta || !tracer_.leave(s->event)) break;
         if (only && i < only->count && s->event != only->number[size_t(i)]) return {};
         seed.events.add(s->event);
-        const Vec3d p = tracer_.ray().o;
-        way += length(p - last);
-        last = p;
         const Rgb emission = emission_here();
         if (emission.is_zero()) continue;
-        const double distance = lamp_.is_infinite() ? 1 : way + length(Vec3d(lamp_.p) - p);
-        ends[count++] = {i + 1, tracer_.value() * emission * float(1 / sqr(distance))};
+        const ChainRay& ray = tracer_.ray();
+        const double distance = lamp_.is_infinite() ? 1 : ray.way + length(Vec3d(lamp_.p) - ray.o);
+        ends[count++] = {i + 1, ray, tracer_.value() * emission * float(1 / sqr(distance))};
     }
     if (count == 0) return {};
     const End& end = ends[std::min(size_t(sampler.next_1d() * float(count)), count - 1)];
     seed.events.count = end.events;
+    seed.ray = end.ray;
     seed.guess = end.guess;
     return seed;
 }

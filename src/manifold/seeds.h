@@ -11,6 +11,7 @@ namespace etendue {
 struct ChainSeed {
     Vec3d w;  ///< Direction at the eye vertex.
     ChainEvents events;
+    ChainRay ray;  ///< Behind the events.
     /// What the path would contribute per unit of throughput at the eye vertex if the lamp's point lay in the direction of the
     /// ray, and surfaces did not focus: a guess.
     Rgb guess;

@@ -37,11 +37,12 @@ struct Solution {
     double weight = 0;
 };
 
-/// The path along the direction `w` that Newton's method has found; empty where it contributes nothing.
+/// The path along the direction `w` that Newton's method has found, and the tracer has followed; empty where it contributes
+/// nothing.
 std::optional<Solution> evaluate(const Vertex& from, const LampPoint& lamp, Vec3d w,
                                  const ChainEvents& events, ChainTracer& tracer) {
     const BsdfEval f = from.eval(to_float(w), TransportMode::Radiance);
-    if (f.f.is_zero() || !tracer.follow(w, events)) return {};
+    if (f.f.is_zero()) return {};
     const ChainRay& ray = tracer.ray();
     const Rgb emitted = lamp.emission(-to_float(ray.d));
     if (emitted.is_zero()) return {};
@@ -65,7 +66,7 @@ uint64_t count_trials(const Solution& found, const LampPoint& lamp, ChainSeeds& 
         ++work.stats.chain_trials;
         const auto seed = seeds.draw(sampler, &found.events);
         if (!seed || !(seed->events == found.events)) continue;
-        const auto w = tracer.solve(seed->w, seed->events, lamp);
+        const auto w = tracer.solve(seed->w, seed->events, seed->ray, lamp);
         if (w && is_same_solution(*w, found.w)) return n;
     }
     ++work.stats.runaways;
@@ -164,10 +165,11 @@ std::optional<Join> join_specular(const Scene& scene, const SubPath& z, int t,
     const float guess = luminance(from.beta * f * seed->guess) / float(lamp.pdf) * film_weight,
                 q_guess = std::fmax(kLeast, join_survival(kMargin * guess, limits.threshold));
     if (!survives(q_guess)) return {};
-    const auto w = tracer.solve(seed->w, seed->events, lamp);
+    const auto w = tracer.solve(seed->w, seed->events, seed->ray, lamp);
     if (!w) return {};
     auto found = evaluate(from, lamp, *w, seed->events, tracer);
     if (!found) return {};
+    const RayEnd first = tracer.first();
     found->contribution *= 1 / q_guess;
     const float share = luminance(found->contribution) * float(found->weight) * film_weight,
                 q = join_survival(share, limits.threshold);
@@ -176,15 +178,13 @@ std::optional<Join> join_specular(const Scene& scene, const SubPath& z, int t,
     ++work.stats.chains;
     const uint64_t trials = count_trials(*found, lamp, seeds, tracer, sampler, work);
     if (work.is_observed) record(lamp, *found, tracer, work.pair);
-    tracer.start(found->w);
-    tracer.advance();
     return Join{.technique = {Strategy::Specular, found->events.count + 1, t},
                 .emitter = lamp.emitter,
                 .contribution = found->contribution * float(trials),
                 .mis_weight = float(found->weight),
                 .film = z.film,
                 .a = from.ray_end(),
-                .b = tracer.vertex().ray_end(),
+                .b = first,
                 .needs_test = false};
 }
 

@@ -559,7 +559,7 @@ TEST(SpecularConnections, PointLightInAGlassBall) {
     for (const int events : {1, 2}) {
         returning += std::pow(R, float(events - 1));
         expect_image(
-            scene, {fmt::format("path:max_depth={}{}", events + 2, kSpecular)}, 1024,
+            scene, {fmt::format("path:max_depth={}{}", events + 2, kSpecular)}, 4096,
             [&](float x, float y) {
                 const Vec3 v = Vec3{0.2f, 0.1f, 3} - on_plane(1, x, y);
                 return kFloor * Rgb(3, 2, 1) *
