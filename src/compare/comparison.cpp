@@ -14,6 +14,7 @@
 #include "image/radiance_file.h"
 #include "integrator/auto.h"
 #include "math/statistics.h"
+#include "render/method_choice.h"
 #include "render/warnings.h"
 #include "system/failure.h"
 
@@ -125,6 +126,10 @@ void render_in_turns(std::vector<MethodRun>& method_runs, const CompareSettings&
 void render_techniques(const Scene& scene, const CompareSettings& settings, Method& method,
                        const std::atomic<bool>& interrupted) {
     RenderSettings s = render_settings(settings, method.spec.integrator, settings.seed);
+    if (method.choice) {
+        s = with_chosen_method(s, *method.choice);
+        s.choice = nullptr;  // The time of its pilots is not that of these images.
+    }
     s.technique_depth = settings.technique_depth;
     s.seconds = method.runs.front().seconds / 4;
     Renderer renderer(scene, s);
@@ -323,6 +328,7 @@ Comparison compare(const Scene& scene, const Reference& reference, const Compare
             m.runs.push_back(finished_run(c, seed, reference));
             if (m.runs.size() > 1) continue;
             m.estimator = c.renderer->integrator().estimator();
+            m.choice = c.renderer->settings().choice;
             m.image = c.renderer->film().image();
             m.peak_bytes = c.memory.peak_bytes();
         }

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -58,6 +59,7 @@ struct Method {
     Estimator estimator = Estimator::Unbiased;
     std::vector<Run> runs;
     // Of the first of them:
+    std::shared_ptr<const MethodChoice> choice;  ///< Where `auto` has chosen.
     std::vector<Rgb> image;
     std::vector<float> flip_map;
     double flip = 0;

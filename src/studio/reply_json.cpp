@@ -90,7 +90,7 @@ json to_json(const RunStatus& s) {
     json j = progress_of(s);
     j["integrator"] = s.request.integrator;
     if (s.choice) {
-        j["auto"] = json::parse(s.choice->to_json().dump());
+        j["auto"] = json::parse(s.choice->to_text());
         j["auto"]["message"] = s.choice->message();
     }
     j["why_look_only"] = s.why_look_only;
