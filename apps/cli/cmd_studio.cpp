@@ -27,6 +27,7 @@
 #include "studio/api.h"
 #include "studio/guard.h"
 #include "studio/server.h"
+#include "system/memory_limit.h"
 #include "system/output_file.h"
 
 namespace etendue {
@@ -139,13 +140,21 @@ void StudioCommand::tell_of_kept_runs(Session& session) const {
 /// Saves all images, and waits for the files of runs. `drop`, of a second signal or at the end of the time of grace,
 /// discards the pass in flight.
 void StudioCommand::finish(Session& session, const std::atomic<bool>& drop) const {
+    // The runs may have taken all of it, and what there is needs some more to be written.
+    const UnlimitedMemory unlimited;
     std::atomic<bool> is_saved{false};
-    std::thread dropper([&] {
-        while (!is_saved) {
-            std::this_thread::sleep_for(std::chrono::milliseconds(50));
-            if (drop) session.stop_all(true);
-        }
-    });
+    std::thread dropper;
+    try {
+        dropper = std::thread([&] {
+            while (!is_saved) {
+                std::this_thread::sleep_for(std::chrono::milliseconds(50));
+                if (drop) session.stop_all(true);
+            }
+        });
+    } catch (const std::exception&) {
+        // Nobody would heed another signal.
+        session.stop_all(true);
+    }
     std::exception_ptr failure;
     try {
         save_all(session);
@@ -160,7 +169,7 @@ void StudioCommand::finish(Session& session, const std::atomic<bool>& drop) cons
         if (!failure) failure = std::current_exception();
     }
     is_saved = true;
-    dropper.join();
+    if (dropper.joinable()) dropper.join();
     if (failure) std::rethrow_exception(failure);
 }
 
@@ -220,17 +229,24 @@ void StudioCommand::watch(Session& session, const Api& api, const std::atomic<bo
     }
 }
 
-/// Puts all sensors, one of which is used, where the camera is. A sensor that mirrors the image still does.
+/// By how much a transform stretches each axis; the first one is negative where it mirrors the image.
+Vec3 scale_of(const Transform& t) {
+    const float mirror = t.determinant3() < 0 ? -1.0f : 1.0f;
+    return {mirror * length(t.vector({1, 0, 0})), length(t.vector({0, 1, 0})),
+            length(t.vector({0, 0, 1}))};
+}
+
+/// Puts all sensors, one of which is used, where the camera is. A sensor that mirrors the image still does, and an
+/// orthographic one shows as much as before.
 void place_sensors(SceneDescription& description, const SceneView::Camera& camera) {
     const auto to_world = Transform::look_at(camera.eye, camera.target, camera.up);
     for (SceneObject& o : description.objects) {
         if (o.category != "sensor" || !to_world) continue;
         const Param* old = o.find("to_world");
         const Transform* before = old ? old->as<Transform>() : nullptr;
-        const bool is_mirrored = before && before->determinant3() < 0;
         Param placed{
             "to_world",
-            SharedTransform(is_mirrored ? *to_world * Transform::scale({-1, 1, 1}) : *to_world),
+            SharedTransform(before ? *to_world * Transform::scale(scale_of(*before)) : *to_world),
             o.where};
         std::erase_if(o.params, [](const Param& p) { return p.name == "to_world"; });
         o.params.push_back(std::move(placed));

@@ -2,6 +2,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <map>
 #include <string_view>
 
@@ -12,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
+#include "image/radiance_file.h"
 #include "interrupt.h"
 #include "json_text.h"
 #include "messages.h"
@@ -266,16 +268,44 @@ void print_report(const VerifyReport& report, const ImageSeries& images, const I
     fmt::print("; {}\n", power(report.detectable(m)));
 }
 
+void throw_all(const std::vector<std::string>& failures) {
+    if (!failures.empty()) throw std::runtime_error(fmt::format("{}", fmt::join(failures, "; ")));
+}
+
+/// The files of folders, and the others.
+std::vector<std::string> files_of(const std::vector<std::string>& names) {
+    std::vector<std::string> files;
+    for (const std::string& name : names) {
+        if (!std::filesystem::is_directory(name)) {
+            files.push_back(name);
+            continue;
+        }
+        const std::vector<std::string> inside = radiance_files(name);
+        files.insert(files.end(), inside.begin(), inside.end());
+    }
+    return files;
+}
+
 void VerifyCommand::compare_images() const {
+    for (const auto* names : {&images, &against})
+        for (const std::string& file : files_of(*names))
+            refuse_same_file("image", file, "results", json);
     if (!json.empty()) OutputFile::check(json);
     ImageSeries ours(options.tiles), theirs(options.tiles);
     ours.add_files(images);
     theirs.add_files(against);
     const VerifyReport report = verify_images(ours, theirs, options.alpha);
-    if (!json.empty()) write_file(json, json_text(to_json(report, ours, theirs, options.alpha)));
+    // The file first, since standard output may have gone.
+    const std::string not_written = failure_of([&] {
+        if (!json.empty())
+            write_file(json, json_text(to_json(report, ours, theirs, options.alpha)));
+    });
     if (!quiet) print_report(report, ours, theirs, options.alpha);
+    std::vector<std::string> failures;
+    if (!not_written.empty()) failures.push_back(not_written);
     if (report.verdict(report.methods.front()) == Verdict::Deviates)
-        throw std::runtime_error("the expectations of the images differ");
+        failures.emplace_back("the expectations of the images differ");
+    throw_all(failures);
 }
 
 void VerifyCommand::run() {
@@ -328,7 +358,7 @@ void VerifyCommand::run() {
     if (!rejected.empty())
         failures.push_back(
             fmt::format("claimed to be unbiased, but rejected: {}", fmt::join(rejected, ", ")));
-    if (!failures.empty()) throw std::runtime_error(fmt::format("{}", fmt::join(failures, "; ")));
+    throw_all(failures);
 }
 
 /// Options that apply to --images as well.

@@ -290,6 +290,7 @@ constexpr const char *kMesh = "mesh", *kImage = "image";
 const char* embedded_parameter(const SceneObject& object) {
     if (object.category == "shape" && object.type == "mesh") return kMesh;
     if (object.category == "texture" && object.type == "bitmap") return kImage;
+    if (object.category == "emitter" && object.type == "envmap") return kImage;
     return nullptr;
 }
 
@@ -303,9 +304,10 @@ nb::object embedded_to_python(const SceneDescription& scene, const SceneObject& 
                               const Param& param) {
     const int64_t* index = param.as<int64_t>();
     if (!index || *index < 0) return to_python(param.value);
-    if (object.category == "shape" && uint64_t(*index) < scene.meshes.size())
+    const char* const parameter = embedded_parameter(object);
+    if (parameter == kMesh && uint64_t(*index) < scene.meshes.size())
         return to_python(scene.meshes[size_t(*index)]);
-    if (object.category == "texture" && uint64_t(*index) < scene.images.size()) {
+    if (parameter == kImage && uint64_t(*index) < scene.images.size()) {
         const EncodedImage& image = scene.images[size_t(*index)];
         nb::dict d;
         d["name"] = image.name;

@@ -362,7 +362,7 @@ Comparison compare(const Scene& scene, const Reference& reference, const Compare
 
 std::vector<MethodSummary> summarize(const Comparison& comparison) {
     std::vector<MethodSummary> out;
-    std::vector<double> base_errors;
+    std::vector<double> base_costs;
     for (const Method& m : comparison.methods) {
         MethodSummary& s = out.emplace_back();
         s.spp = mean(of_runs(m, [](const Run& r) { return r.spp; }));
@@ -390,9 +390,11 @@ std::vector<MethodSummary> summarize(const Comparison& comparison) {
             m, [](const ImageErrors& e) { return e.rel_mse; }, slopes);
         s.rel_mse_slope_interval = mean_interval(slopes);
 
-        if (out.size() == 1) base_errors = rel_mse;
-        s.efficiency =
-            relative_efficiency({base_errors, out.front().seconds}, {rel_mse, s.seconds});
+        // Runs may have different lengths, such as those of another program.
+        const std::vector<double> costs =
+            of_runs(m, [](const Run& r) { return r.errors().rel_mse * r.seconds; });
+        if (out.size() == 1) base_costs = costs;
+        s.efficiency = relative_efficiency(base_costs, costs);
         const double measured =
             mean(of_runs(m, [](const Run& r) { return r.uncorrected.rel_mse; }));
         if (comparison.reference.has_variance() && measured > 0)

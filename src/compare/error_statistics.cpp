@@ -49,17 +49,17 @@ std::optional<PowerLaw> fit_power_law(std::span<const double> times, std::span<c
     return PowerLaw{slope, std::exp(y_mean - slope * x_mean), int(x.size())};
 }
 
-std::optional<Efficiency> relative_efficiency(const Cost& base, const Cost& method) {
-    const Mean e0(base.squared_errors), e1(method.squared_errors);
-    const double c0 = e0.value * base.seconds, c1 = e1.value * method.seconds;
-    if (!(c0 > 0) || !(c1 > 0)) return {};
-    Efficiency out{c0 / c1, {}};
-    const size_t runs = std::min(base.squared_errors.size(), method.squared_errors.size());
+std::optional<Efficiency> relative_efficiency(std::span<const double> base,
+                                              std::span<const double> method) {
+    const Mean c0(base), c1(method);
+    if (!(c0.value > 0) || !(c1.value > 0)) return {};
+    Efficiency out{c0.value / c1.value, {}};
+    const size_t runs = std::min(base.size(), method.size());
     if (runs < 2) return out;
-    // To first order the variance of log e is var(e) / e². The degrees of freedom are those of the side with fewer
+    // To first order the variance of log c is var(c) / c². The degrees of freedom are those of the side with fewer
     // runs.
     const double spread =
-        std::sqrt(e0.variance / (e0.value * e0.value) + e1.variance / (e1.value * e1.value));
+        std::sqrt(c0.variance / (c0.value * c0.value) + c1.variance / (c1.value * c1.value));
     const double factor = std::exp(student_quantile(0.05, double(runs - 1)) * spread);
     out.interval = Interval{out.value, out.value / factor, out.value * factor};
     return out;

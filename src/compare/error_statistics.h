@@ -24,18 +24,15 @@ struct PowerLaw {
 std::optional<PowerLaw> fit_power_law(std::span<const double> times, std::span<const double> errors,
                                       double from = 0);
 
-/// One method's squared errors over its runs, and the time of one run.
-struct Cost {
-    std::span<const double> squared_errors;
-    double seconds;
-};
-/// Efficiency 1 / (squared error · time) [Veach 1997, §2.3.2] of `method` relative to `base`. The interval, for two
-/// runs or more, assumes normally distributed logarithms. Empty where an error is not positive.
+/// Efficiency 1 / (squared error · time) [Veach 1997, §2.3.2] of a method relative to another one, from the products of
+/// squared error and time of their runs. The interval, for two runs or more, assumes normally distributed logarithms. Empty where the mean of
+/// the products is not positive.
 struct Efficiency {
     double value = 0;
     std::optional<Interval> interval;
 };
-std::optional<Efficiency> relative_efficiency(const Cost& base, const Cost& method);
+std::optional<Efficiency> relative_efficiency(std::span<const double> base,
+                                              std::span<const double> method);
 
 /// Interval of the ratio X / R of two independent means, from their relative standard errors.
 Interval ratio_interval(double ratio, double relative_error_x, double relative_error_r);

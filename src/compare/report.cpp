@@ -171,6 +171,22 @@ LogLogPlot convergence(const Comparison& c, const std::vector<MethodSummary>& su
     return plot;
 }
 
+/// What follows the stem of a method in the names of its maps.
+constexpr const char *kFlip = "-flip", *kSquaredErrors = "-relse";
+
+/// The stem of a method's files, numbered where files of others have one of these names.
+std::string free_stem(const std::string& stem, std::set<std::string>& taken) {
+    for (int i = 1;; ++i) {
+        const std::string free = i == 1 ? stem : fmt::format("{}-{}", stem, i);
+        const std::string names[] = {free, free + kFlip, free + kSquaredErrors};
+        if (std::any_of(std::begin(names), std::end(names),
+                        [&](const std::string& n) { return taken.contains(n); }))
+            continue;
+        taken.insert(std::begin(names), std::end(names));
+        return free;
+    }
+}
+
 /// Writes the images and plots of one scene to its folder; write() returns those that the page shows, as JSON.
 class SceneFigures {
 public:
@@ -185,7 +201,9 @@ public:
         page["reference"] =
             radiance_data_uri(c_.reference.width, c_.reference.height, c_.reference.pixels);
         page["methods"] = Json::array();
-        for (const Method& m : c_.methods) page["methods"].push_back(write_method(m));
+        std::set<std::string> taken{"reference"};
+        for (const Method& m : c_.methods)
+            page["methods"].push_back(write_method(m, free_stem(file_stem(m.name()), taken)));
         page["plots"] = write_plots();
         return page;
     }
@@ -204,12 +222,11 @@ private:
                     rgb_image(c_.reference.width, c_.reference.height, false_colours(values)));
     }
 
-    Json write_method(const Method& m) const {
+    Json write_method(const Method& m, const std::string& stem) const {
         const auto [w, h] = std::pair{c_.reference.width, c_.reference.height};
-        const std::string stem = file_stem(m.name());
         write_picture(stem, m.image);
-        write_map(stem + "-flip", m.flip_map);
-        write_map(stem + "-relse", relative_squared_errors(m.image, c_.reference.pixels));
+        write_map(stem + kFlip, m.flip_map);
+        write_map(stem + kSquaredErrors, relative_squared_errors(m.image, c_.reference.pixels));
         Json page{{"name", m.name()},
                   {"image", radiance_data_uri(w, h, m.image)},
                   {"flip", grey_data_uri(w, h, m.flip_map)},

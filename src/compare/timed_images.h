@@ -10,7 +10,7 @@
 namespace etendue {
 
 /// Images in a folder. The name of each ends with its rendering time, which samples per pixel may precede: 2.5s.exr,
-/// 64spp-2.5s.exr. What stands before them names its run: seed7-64spp-2.5s.exr.
+/// 64spp-2.5s.exr. What stands before them, with - or _ between, names its run: seed7-64spp-2.5s.exr.
 struct TimedImages {
     struct File {
         std::string path;

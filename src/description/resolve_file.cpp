@@ -68,6 +68,14 @@ bool is_absolute(const std::string& file) {
 
 }  // namespace
 
+const EncodedImage* embedded_image(const Params& params) {
+    const auto& images = params.scene().images;
+    if (!params.has("image") || images.empty()) return nullptr;
+    const EncodedImage& image =
+        images[size_t(params.integer("image", 0, 0, int64_t(images.size()) - 1))];
+    return &image;
+}
+
 std::vector<std::string> spellings(const std::string& file) {
     std::vector<std::string> all = {file};
     if (file.find('\\') != file.npos) {

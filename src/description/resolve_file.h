@@ -1,5 +1,5 @@
 #pragma once
-// Search for the files that a scene names.
+// Search for the files that a scene names, and for the images that it holds in their place.
 
 #include <string>
 #include <string_view>
@@ -12,6 +12,10 @@ namespace etendue {
 /// Path of the file named by string parameter `name`: an absolute path, or one relative to the first of the scene's
 /// search paths that contains it. Throws SceneError with the folders searched and the nearest name found there.
 std::string resolve_file(const Params& params, std::string_view name = "filename");
+
+/// The image of the scene file itself whose index is the parameter "image"; nullptr where there is none, so that the image
+/// is a file.
+const EncodedImage* embedded_image(const Params& params);
 
 /// The names under which a file is looked for: its own, and with '/' for '\', which scenes written on Windows have.
 std::vector<std::string> spellings(const std::string& file);

@@ -76,7 +76,7 @@ struct SceneDescription {
     std::vector<int> roots;            ///< The scene's own children, in file order.
     /// Meshes that the scene file holds itself, see shape `mesh`; not copied with the description.
     std::vector<Shared<MeshData>> meshes;
-    /// Images that the scene file holds itself, see texture `bitmap`.
+    /// Images that the scene file holds itself, see texture `bitmap` and emitter `envmap`.
     std::vector<Shared<EncodedImage>> images;
     std::string file;  ///< The scene file, as given.
     /// Directories in which relative file names are looked up, in order; the scene file's own comes first.

@@ -148,6 +148,11 @@ private:
     double mean_ = 0;  ///< Mean luminance over the sphere.
 };
 
+/// The parameter that names the image.
+const char* image_parameter(const Params& p) {
+    return embedded_image(p) ? "image" : "filename";
+}
+
 }  // namespace
 
 std::unique_ptr<Emitter> make_environment(int width, int height, std::vector<Rgb> pixels,
@@ -156,17 +161,19 @@ std::unique_ptr<Emitter> make_environment(int width, int height, std::vector<Rgb
 }
 
 RgbImage read_emission_image(const Params& p, Rgb factor) {
-    const std::string path = resolve_file(p);
+    const EncodedImage* const embedded = embedded_image(p);
+    const std::string name = embedded ? embedded->name : resolve_file(p);
     RgbImage image;
     try {
-        image = read_rgb(path);
+        image = embedded ? decode_rgb(embedded->bytes, name) : read_rgb(name);
     } catch (const std::exception& e) {
-        p.fail("filename", e.what());
+        p.fail(image_parameter(p), e.what());
     }
     for (Rgb& c : image.pixels) {
         c *= factor;
         if (!is_finite(c) || std::min({c.r, c.g, c.b}) < 0)
-            p.fail("filename", "image \"" + path + "\" has a pixel that is negative or not finite");
+            p.fail(image_parameter(p),
+                   "image \"" + name + "\" has a pixel that is negative or not finite");
     }
     return image;
 }
@@ -176,9 +183,11 @@ std::unique_ptr<Emitter> make_environment(const Params& p, RgbImage image,
     if (p.choice("projection", {"latlong", "equalarea"}, 0) == 0)
         return make_environment(image.width, image.height, std::move(image.pixels), to_world);
     if (image.width != image.height)
-        p.fail("filename", fmt::format("{}: an image in the equal-area projection is square, but "
-                                       "this one has {} x {} pixels",
-                                       p.text("filename", ""), image.width, image.height));
+        p.fail(image_parameter(p),
+               fmt::format("{}: an image in the equal-area projection is square, but this one has "
+                           "{} x {} pixels",
+                           embedded_image(p) ? embedded_image(p)->name : p.text("filename", ""),
+                           image.width, image.height));
     return make_equal_area_environment(image.width, std::move(image.pixels), to_world);
 }
 
@@ -189,6 +198,8 @@ EmitterEntry envmap_entry() {
              {{"filename", ParamKind::String, "",
                "Image of any supported format; the upper edge of a latitude-longitude image is the "
                "zenith."},
+              {"image", ParamKind::Int, "",
+               "Index of the image among those of the scene file, from 0, instead of filename."},
               {"scale", ParamKind::Float, "1", "Factor on the radiance."},
               {"tint", ParamKind::Rgb, "1", "Factor on the radiance, by colour."},
               {"projection", ParamKind::String, "latlong",

@@ -17,7 +17,7 @@ std::unique_ptr<Emitter> make_environment(int width, int height, std::vector<Rgb
 /// pixel is a region of one radiance.
 std::unique_ptr<Emitter> make_equal_area_environment(int size, std::vector<Rgb> pixels,
                                                      const Transform& to_world);
-/// The image of parameter "filename" times `factor`; throws SceneError where it is no emission.
+/// The image of parameter "image" or "filename" times `factor`; throws SceneError where it is no emission.
 RgbImage read_emission_image(const Params& params, Rgb factor);
 /// An environment of `image` in the projection that parameter "projection" names.
 std::unique_ptr<Emitter> make_environment(const Params& params, RgbImage image,

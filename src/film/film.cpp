@@ -126,6 +126,8 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
     const bool second = !has_groups() && passes_ % 2 == 1;
     const size_t g = has_groups() ? passes_ % group_sums_.size() : 0;
     float* const group = has_groups() ? group_sums_[g].data() : nullptr;
+    const bool keeps_largest = !largest_.empty();
+    const auto index = uint32_t(passes_);
     // All memory is allocated before anything changes, so that a failure leaves the totals unchanged. From then on nothing
     // throws, apart from the exchange with other processes, which end then.
     std::vector<double> luminance_sum(chunks), total(chunks), pair_sum(chunks), pass_sum(chunks);
@@ -143,6 +145,7 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
             }
             const float y = luminance(v);
             luminance_sum[chunk] += y;
+            if (keeps_largest && y > largest_[i].luminance) largest_[i] = {y, index};
             if (second) total[chunk] += double(mean_of(i));
             if (group) {
                 group[i] +=

@@ -24,6 +24,12 @@ struct ErrorEstimate {
     bool valid = false;        ///< False until there are enough passes.
 };
 
+/// The pass in which a pixel was brightest, counted from the first one of the film; 0 if it was black in all of them.
+struct LargestPass {
+    float luminance = 0;  ///< Of the pixel in this pass.
+    uint32_t pass = 0;
+};
+
 /// Accumulates passes. The image of the current pass is separate from the totals, so that the pass can be discarded. A
 /// finished pass is added to the totals. Within a pass, the eye contributions of a pixel come from one thread at a
 /// time; splats may come from any thread.
@@ -83,6 +89,8 @@ public:
     /// Declares that several processes render the image, all of which have such a film. Each of them adds up a part of the
     /// pixels. The film must have no groups. To be called before the first pass.
     void set_ranks(const Ranks& ranks);
+    /// From now on, notes for every pixel the pass in which it is brightest; of several processes, each for its own pixels.
+    void keep_largest() { largest_.assign(geometry_.pixel_count(), {}); }
 
     // -- The current pass.
 
@@ -150,6 +158,9 @@ public:
     };
     /// The sums of all pixels, row by row.
     std::span<const Moments> moments() const { return moments_; }
+    /// The brightest pass of every pixel since keep_largest(); empty if that was not called. Passes that were loaded or merged
+    /// are not among them.
+    std::span<const LargestPass> largest() const { return largest_; }
 
     // -- Between passes.
 
@@ -211,6 +222,7 @@ private:
     bool is_merged_ = false;  ///< Whether it is a sum of several films.
     /// Sums of squared luminance, by pixel, for the error. Empty with groups.
     std::vector<double> luminance_squares_;
+    std::vector<LargestPass> largest_;
 
     const Ranks* ranks_ = &kAlone;
     /// The first chunk and the first pixel of each process, and their numbers.

@@ -482,6 +482,15 @@ std::vector<float> to_floats(const ImageContents& c, bool keep_codes) {
     return out;
 }
 
+Image to_image(ImageContents c) {
+    Image image;
+    image.width = c.pixels.width, image.height = c.pixels.height;
+    image.data = to_floats(c, false);
+    image.channels = std::move(c.channels);
+    image.attributes = std::move(c.attributes);
+    return image;
+}
+
 PixelBuffer to_pixels(ImageContents c, bool raw) {
     const bool is_deep = std::holds_alternative<std::vector<float>>(c.pixels.data);
     if (is_deep && !c.is_linear && !raw) c.pixels.data = to_floats(c, false);
@@ -491,15 +500,11 @@ PixelBuffer to_pixels(ImageContents c, bool raw) {
 }  // namespace
 
 Image read_image(const std::string& path) {
-    return decode_in_memory(path, [&] {
-        ImageContents c = read_contents(path, true);
-        Image image;
-        image.width = c.pixels.width, image.height = c.pixels.height;
-        image.data = to_floats(c, false);
-        image.channels = std::move(c.channels);
-        image.attributes = std::move(c.attributes);
-        return image;
-    });
+    return decode_in_memory(path, [&] { return to_image(read_contents(path, true)); });
+}
+
+Image decode_image(const std::string& bytes, const std::string& name) {
+    return decode_in_memory(name, [&] { return to_image(contents_of({name, bytes}, true)); });
 }
 
 PixelBuffer read_pixels(const std::string& path, bool raw) {

@@ -6,7 +6,7 @@
 
 namespace etendue {
 
-// read_image(), read_pixels(), decode_pixels() and encode_png() of image_io.h, and:
+// read_image(), decode_image(), read_pixels(), decode_pixels() and encode_png() of image_io.h, and:
 
 /// Stores all channels and attributes; `image` has any channels. Errors of the file are left to its commit().
 void write_exr(OutputFile& file, const Image& image, ExrPrecision precision);

@@ -108,6 +108,16 @@ const Writer& writer_for(const std::string& path) {
                fmt::format("its name must end in .exr, .pfm, .hdr or .png, not in \"{}\"", e));
 }
 
+RgbImage colours_of(const Image& image, const std::string& name, std::string_view layer) {
+    return decode_in_memory(name, [&]() -> RgbImage {
+        try {
+            return {image.width, image.height, rgb_pixels(image, layer)};
+        } catch (const std::runtime_error& e) {
+            fail_read(name, e.what());
+        }
+    });
+}
+
 }  // namespace
 
 std::vector<uint8_t> srgb_codes(std::span<const Rgb> pixels) {
@@ -138,14 +148,11 @@ std::string image_extension(const std::string& path) {
 }
 
 RgbImage read_rgb(const std::string& path, std::string_view layer) {
-    const Image image = read_image(path);
-    return decode_in_memory(path, [&]() -> RgbImage {
-        try {
-            return {image.width, image.height, rgb_pixels(image, layer)};
-        } catch (const std::runtime_error& e) {
-            fail_read(path, e.what());
-        }
-    });
+    return colours_of(read_image(path), path, layer);
+}
+
+RgbImage decode_rgb(const std::string& bytes, const std::string& name) {
+    return colours_of(decode_image(bytes, name), name, "");
 }
 
 void check_image_extension(const std::string& path) {

@@ -14,6 +14,8 @@ namespace etendue {
 /// Reads .exr (flat, its first part), .png, .jpg, .hdr, .pfm, .tga, .bmp, .pgm and .ppm. The content decides, not the name.
 /// Integer formats are decoded from sRGB, except alpha and files declared linear.
 Image read_image(const std::string& path);
+/// The same for the bytes of a file; `name` is its name in messages.
+Image decode_image(const std::string& bytes, const std::string& name);
 
 /// The colours of one layer; see rgb_pixels().
 struct RgbImage {
@@ -21,6 +23,7 @@ struct RgbImage {
     std::vector<Rgb> pixels;
 };
 RgbImage read_rgb(const std::string& path, std::string_view layer = "");
+RgbImage decode_rgb(const std::string& bytes, const std::string& name);
 
 /// Reads pixels for a texture in the file's own precision. 8-bit formats stay codes; deeper integer formats become
 /// floats, decoded from sRGB unless `raw`.

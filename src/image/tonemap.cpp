@@ -48,7 +48,8 @@ double inverse_aces_curve(double y) {
 
 std::vector<Rgb> tone_map(std::span<const Rgb> pixels, const ToneMapping& mapping) {
     std::vector<Rgb> mapped(pixels.begin(), pixels.end());
-    const float scale = std::exp2(mapping.exposure);
+    // Zero times infinity would be no colour.
+    const float scale = std::exp2(std::clamp(mapping.exposure, -126.0f, 127.0f));
     double white = mapping.white;
     if (mapping.op == ToneOperator::Reinhard && white <= 0) {
         for (const Rgb c : mapped)

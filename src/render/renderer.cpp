@@ -224,6 +224,8 @@ const FilmGeometry& fitting_film(const Scene& scene, const RenderSettings& setti
     uint64_t bytes =
         g.pixel_count() * Film::bytes_per_pixel(light_paths > 0, integrator.error_groups()) +
         g.pixel_count() * sizeof(Rgb);
+    if (settings.keeps_largest && integrator.error_groups() == 0)
+        bytes += g.pixel_count() * sizeof(LargestPass);
     if (settings.ranks->count() > 1) bytes += g.pixel_count() * sizeof(Rgb);
     if (settings.technique_depth > 0)
         bytes += TechniqueImages::memory_bytes(g.pixel_count(), settings.technique_depth);
@@ -274,7 +276,10 @@ Renderer::Renderer(const Scene& scene, const RenderSettings& settings,
     check_limits(settings, settings.first_pass);
     check_ranks(settings, *integrator_);
     film_.set_ranks(*settings.ranks);
-    if (integrator_->error_groups() > 0) film_.set_groups(integrator_->error_groups());
+    if (integrator_->error_groups() > 0)
+        film_.set_groups(integrator_->error_groups());
+    else if (settings.keeps_largest)
+        film_.keep_largest();
     if (settings.technique_depth > 0)
         techniques_ = std::make_unique<TechniqueImages>(
             scene.film(), scene.filter(), settings.technique_depth, typical_radiance(scene));

@@ -53,6 +53,8 @@ struct RenderSettings : RenderOptions {
     /// If not empty, called by the threads of a pass again and again while its samples are traced. It may call
     /// Renderer::sample_again(), and must not throw exceptions.
     std::function<void()> meanwhile;
+    /// Whether the film notes the brightest pass of every pixel, see Film::largest(). Passes of chains are not noted.
+    bool keeps_largest = false;
     /// The processes that render the image together, each of them by a Renderer with these settings. They must outlive it.
     const Ranks* ranks = &kAlone;
 };

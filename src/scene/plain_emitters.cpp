@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "description/resolve_file.h"
 #include "emitter/environment.h"
 #include "emitter/point.h"
 #include "emitter/sky_model.h"
@@ -174,7 +175,9 @@ void replace_environment(PlainScene& s, int index) {
         projection && *projection->as<std::string>() == std::string("equalarea");
     const Rgb tint = rgb(o, "tint", Rgb(1));
     remove(o, "projection"), remove(o, "tint");
-    if (!name || (!is_equal_area && tint == Rgb(1) && reads_image(*name))) return;
+    const bool is_embedded = embedded_image({s.original(), index}) != nullptr;
+    if (!name && !is_embedded) return;
+    if (!is_equal_area && tint == Rgb(1) && (is_embedded || reads_image(*name))) return;
     RgbImage image = read_emission_image({s.original(), index}, tint);
     if (is_equal_area) {
         image = latitudes_and_longitudes(image);

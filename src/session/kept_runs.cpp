@@ -210,11 +210,13 @@ std::shared_ptr<Session::Run> Session::load_run(const std::string& name) {
         if (!fits)
             throw std::runtime_error(
                 fmt::format("its technique images need more than {} MiB", kTechniqueBytes >> 20));
-        run->settings = answering(settings_of(s.request, IntegratorSpec::parse(header.integrator)));
+        run->settings = settings_of_run(
+            settings_of(s.request, IntegratorSpec::parse(header.integrator)), s.seeds);
         run->settings.choice = s.choice;
         auto renderer = std::make_unique<Renderer>(loaded->scene, run->settings);
         run->conditions = conditions_of(*renderer, loaded->scene, loaded->source, run->settings);
         file.resume(*renderer, run->conditions, run->log);
+        if (run->settings.keeps_largest) run->opened = SumsBefore::of(renderer->film());
         run->renderer = std::move(renderer);
     } catch (...) {
         s.why_look_only = caught();
@@ -276,8 +278,8 @@ int Session::open_now(const std::string& name) {
         const std::lock_guard lock(mutex_);
         run->status.id = ++last_id_;
     }
-    // Here, since the session's thread may be in a long pass.
-    show(*run);
+    // Here, since the session's thread may be in a long pass. What that takes of the processor cannot be told from the rest.
+    publish(*run);
     const std::lock_guard lock(mutex_);
     if (is_closed_) throw std::runtime_error("the program is about to end");
     runs_.push_back(run);

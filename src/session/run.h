@@ -30,7 +30,6 @@ struct Session::Run : std::enable_shared_from_this<Session::Run> {
     SharedSlot<const Snapshot> snapshot;
     SharedSlot<const TechniqueSnapshot> techniques;
     SharedSlot<const SeedSeries> series{std::make_shared<const SeedSeries>()};
-    const std::shared_ptr<LargestPasses> largest = std::make_shared<LargestPasses>();
     std::atomic<bool> is_wanted{true}, wants_techniques{false};
     std::shared_ptr<const LoadedScene> loaded;  ///< Constant from the start on.
     const Scene& scene() const { return loaded->scene; }
@@ -60,7 +59,8 @@ struct Session::Run : std::enable_shared_from_this<Session::Run> {
     std::unique_ptr<const RenderTotals> totals;  ///< In its place, of a run that does not go on.
     Conditions conditions;                       ///< Of the renderer, if runs are kept.
     PassLog log;                                 ///< Of the renderer.
-    bool is_counted = false;                     ///< Whether the renderer's image is among `seeds`.
+    SumsBefore opened;        ///< What the file had from which the run was opened.
+    bool is_counted = false;  ///< Whether the renderer's image is among `seeds`.
     SeedMean seeds;
     int shown_seeds = 0;                                ///< Of them, those in the last snapshot.
     double pass_seconds = 0;                            ///< Of the last pass.

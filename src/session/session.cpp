@@ -224,8 +224,9 @@ void Session::answer_questions() noexcept {
     }
 }
 
-RenderSettings Session::answering(RenderSettings settings) {
+RenderSettings Session::settings_of_run(RenderSettings settings, int seeds) {
     settings.meanwhile = [this] { answer_questions(); };
+    settings.keeps_largest = seeds == 1;
     return settings;
 }
 
@@ -257,7 +258,8 @@ void Session::make_renderer(Run& run) {
     run.log = {};
     if (!folder_) return;
     run.conditions = conditions_of(*run.renderer, run.scene(), run.loaded->source, run.settings);
-    wait_for_next_file(run, 0);
+    // The seeds of a run have one pace together.
+    if (run.next_file == Clock::time_point{}) wait_for_next_file(run, 0);
 }
 
 std::unique_ptr<Integrator> Session::chosen_method(Run& run) {
@@ -328,7 +330,11 @@ bool Session::finish_seed(Run& run) {
         s.figures.swap(figures);
         is_last = count >= s.seeds;
     }
-    if (!is_last) show(run);  // The last one is shown at the end of the turn.
+    // The last one is shown and kept at the end of the turn.
+    if (!is_last) {
+        show(run);
+        if (Clock::now() >= run.next_file) keep(run);
+    }
     return !is_last;
 }
 
@@ -390,8 +396,6 @@ void Session::after_pass(Run& run, const Progress& p) {
                 s.history.push_back({p.passes, p.seconds, error});
         }
     }
-    if (const Film& film = run.renderer->film(); !film.has_groups() && !run.has_seeds())
-        run.largest->add(film.moments(), film.passes());
     run.log.add(p.seconds, p.renderer.stats().pairs);
     // The first picture does not wait. Long passes are shown unasked, so that saving need not wait for the next one.
     constexpr double kLong = 0.5;
@@ -427,9 +431,17 @@ void Session::fill(Run& run, Snapshot& snapshot) {
 }
 
 void Session::show(Run& run) noexcept {
+    if (run.passes() == 0) return;
+    const double before = process_cpu_seconds();
+    publish(run);
+    run.shown_seconds = process_cpu_seconds() - before;
+    const std::lock_guard lock(mutex_);
+    budget_.taken(Clock::now(), run.shown_seconds);
+}
+
+void Session::publish(Run& run) noexcept {
     const uint64_t passes = run.passes();
     if (passes == 0) return;
-    const double before = process_cpu_seconds();
     run.is_wanted = false;
     try {
         ThreadArena arena(threads_);
@@ -452,9 +464,6 @@ void Session::show(Run& run) noexcept {
     } catch (const std::exception&) {
         // No memory: the earlier picture stays, and the run goes on.
     }
-    run.shown_seconds = process_cpu_seconds() - before;
-    const std::lock_guard lock(mutex_);
-    budget_.taken(Clock::now(), run.shown_seconds);
 }
 
 // -- From any thread.
@@ -483,6 +492,11 @@ std::shared_ptr<Session::Run> Session::find(int id) const {
     throw std::runtime_error(fmt::format("there is no run {}", id));
 }
 
+std::shared_ptr<Session::Run> Session::found(int id) const {
+    const std::lock_guard lock(mutex_);
+    return find(id);
+}
+
 int Session::start(const RunRequest& request) {
     const std::shared_ptr<const LoadedScene> loaded = scene_.load();
     if (!loaded) throw std::runtime_error("the scene is not loaded yet");
@@ -496,7 +510,7 @@ int Session::start(const RunRequest& request) {
     s.request.technique_depth =
         request.seeds > 1 ? 0 : fitting_depth(scene, request.technique_depth);
     RenderSettings& settings = run->settings;
-    settings = answering(settings_of(s.request, scene));
+    settings = settings_of_run(settings_of(s.request, scene), request.seeds);
     if (!request.user_paths.empty()) settings.integrator.params["user_paths"] = request.user_paths;
     s.request.integrator = settings.integrator.to_string();
     run->integrator = make_integrator(settings.integrator);
@@ -694,17 +708,16 @@ std::shared_ptr<const SeedSeries> Session::seed_series(int id) const {
     return find(id)->series.load();
 }
 
-std::shared_ptr<const LargestPasses> Session::largest_passes(int id) const {
-    const std::lock_guard lock(mutex_);
-    return find(id)->largest;
+void Session::ask_largest(int id, std::function<void(const LargestPasses&)> done) {
+    const std::shared_ptr<Run> run = found(id);
+    ask([run, done = std::move(done)] {
+        done({run->renderer ? &run->renderer->film() : nullptr, run->opened});
+    });
 }
 
 void Session::replay_last(int id, uint64_t pixel, size_t most_paths,
                           std::function<void(const Replay&, const std::string&)> done) {
-    const std::shared_ptr<Run> run = [&] {
-        const std::lock_guard lock(mutex_);
-        return find(id);
-    }();
+    const std::shared_ptr<Run> run = found(id);
     ask([run, pixel, most_paths, done = std::move(done)] {
         Replay replay;
         const std::string error = failure_of([&] {

@@ -186,8 +186,9 @@ public:
     std::shared_ptr<const TechniqueSnapshot> techniques(int run);
     /// The finished renderings of a run with several seeds; empty for other runs.
     std::shared_ptr<const SeedSeries> seed_series(int run) const;
-    /// The brightest pass of each pixel. Nothing is known of runs with chains or several seeds.
-    std::shared_ptr<const LargestPasses> largest_passes(int run) const;
+    /// Calls `done` in a thread of the session with the brightest pass of each pixel, during the call. Nothing is known of
+    /// runs with chains or several seeds, and of those that can only be looked at.
+    void ask_largest(int run, std::function<void(const LargestPasses&)> done);
     /// Calls `done` in a thread of the session with the paths of a pixel, at most `most_paths`, or with an error. They are
     /// those of the last pass or, while its samples are traced, of the pass in flight, whose end is not waited for.
     void replay_last(int run, uint64_t pixel, size_t most_paths,
@@ -208,22 +209,28 @@ private:
     /// Calls `question`, which changes no run, in a thread of the session, while a pass is traced or between passes.
     void ask(std::function<void()> question);
     void answer_questions() noexcept;
-    /// Settings of a rendering whose threads answer questions.
-    RenderSettings answering(RenderSettings settings);
+    /// Settings of a rendering whose threads answer questions and which keeps its largest passes, unless it is one of
+    /// several seeds.
+    RenderSettings settings_of_run(RenderSettings settings, int seeds);
     /// Carries out a part of the work of a run. An exception ends the run, which keeps its passes.
     template <class Work>
     void guard(Run& run, const Work& work) noexcept;
     RunStatus status_of(const Run& run) const;
+    /// Needs the mutex.
     std::shared_ptr<Run> find(int run) const;
+    /// The same without the mutex.
+    std::shared_ptr<Run> found(int run) const;
     std::shared_ptr<Run> next_run() const;
     void take_turn(Run& run);
     void make_renderer(Run& run);
     /// Lets `auto` choose the method of a run.
     std::unique_ptr<Integrator> chosen_method(Run& run);
     void after_pass(Run& run, const Progress& progress);
+    /// Publishes, in the session's thread, and takes the processor time from the budget.
+    void show(Run& run) noexcept;
     /// Publishes a snapshot, and the technique images if they were requested. Where there is no memory for them, the
     /// earlier ones stay.
-    void show(Run& run) noexcept;
+    void publish(Run& run) noexcept;
     void fill(Run& run, Snapshot& snapshot);
     void finish_turn(Run& run, RunState state, std::string message = {}) noexcept;
     /// Keeps the image of a finished seed. Returns whether another seed follows.

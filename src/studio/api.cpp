@@ -299,6 +299,13 @@ void Api::open(const json& body, const Done& done) {
     });
 }
 
+/// The file is then as it is loaded.
+void Api::reload() {
+    scene_file_version_ = file_version(options_.scene_file);
+    looked_ = {};
+    session_.reload();
+}
+
 void Api::run(const json& body, const Done& done) {
     const std::string action = text_of(body, "action");
     if (action == "start") {
@@ -311,14 +318,12 @@ void Api::run(const json& body, const Done& done) {
         return done(Reply::json("{}"));
     }
     if (action == "reload") {
-        scene_file_version_ = file_version(options_.scene_file);
-        looked_ = {};
-        session_.reload();
+        reload();
         return done(Reply::json("{}"));
     }
     if (action == "view") {
         set_view(body);
-        session_.reload();
+        reload();
         return done(Reply::json("{}"));
     }
     const int id = int(integer(body, "run", 1, INT32_MAX));

@@ -62,6 +62,7 @@ private:
     /// The pixels that owe most to one pass, or the brightest pass of one pixel.
     void worst(const Request& request, const Done& done);
     void set_view(const nlohmann::json& body);
+    void reload();
     void difference(const Request& request, const Done& done);
     void gain(const Request& request, const Done& done);
     Reply techniques(const Request& request);

@@ -182,7 +182,6 @@ Reply Api::pixel(const Request& request) {
 
 void Api::worst(const Request& request, const Done& done) {
     const int id = query_integer(request, "run", 0);
-    const auto largest = session_.largest_passes(id);
     const int width = session_.scene_of(id)->film().crop_width;
     const uint64_t pixels = session_.scene_of(id)->film().pixel_count();
     const auto to_json = [width](const WorstPixel& w) {
@@ -195,18 +194,21 @@ void Api::worst(const Request& request, const Done& done) {
     if (request.query("x")) {
         const int x = query_integer(request, "x", 0), y = query_integer(request, "y", 0);
         check({x, y, 1, 1}, width, int(pixels / uint64_t(width)));
-        const auto found = largest->at(uint64_t(y) * uint64_t(width) + uint64_t(x));
-        return done(Reply::json(
-            dump({{"passes", largest->passes()}, {"pixel", found ? to_json(*found) : json()}})));
+        const uint64_t pixel = uint64_t(y) * uint64_t(width) + uint64_t(x);
+        return session_.ask_largest(id, [pixel, to_json, done](const LargestPasses& largest) {
+            const auto found = largest.at(pixel);
+            done(Reply::json(
+                dump({{"passes", largest.passes()}, {"pixel", found ? to_json(*found) : json()}})));
+        });
     }
     constexpr int kMost = 1000;
     const int count = query_integer(request, "count", 20);
     if (count < 1 || count > kMost)
         throw ApiError(422, fmt::format("\"count\" must be from 1 to {}", kMost));
-    later(workers_, done, [largest, count, to_json] {
+    session_.ask_largest(id, [count, to_json, done](const LargestPasses& largest) {
         json list = json::array();
-        for (const WorstPixel& w : largest->worst(size_t(count))) list.push_back(to_json(w));
-        return Reply::json(dump({{"passes", largest->passes()}, {"pixels", list}}));
+        for (const WorstPixel& w : largest.worst(size_t(count))) list.push_back(to_json(w));
+        done(Reply::json(dump({{"passes", largest.passes()}, {"pixels", list}})));
     });
 }
 

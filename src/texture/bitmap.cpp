@@ -247,12 +247,9 @@ public:
 };
 
 const PixelBuffer& load_image(const Params& params, TextureContext& context, bool raw) {
-    const auto& images = params.scene().images;
-    if (!params.has("image") || images.empty())
-        return context.images().load(resolve_file(params), raw);
-    const EncodedImage& image =
-        images[size_t(params.integer("image", 0, 0, int64_t(images.size()) - 1))];
-    return context.images().decode(image, raw);
+    if (const EncodedImage* image = embedded_image(params))
+        return context.images().decode(*image, raw);
+    return context.images().load(resolve_file(params), raw);
 }
 
 std::unique_ptr<Texture> make_bitmap(const Params& params, TextureContext& context) {

@@ -21,7 +21,7 @@ public:
     explicit ImageSeries(int tiles = VerifyOptions().tiles) : tiles_(tiles) {}
 
     /// Throws std::runtime_error, with the name of the image, where its size is another than that of the images before
-    /// it, or its pixels are the same as those of one of them.
+    /// it, or its pixels are the same as those of one of them and not black.
     void add(const std::string& name, const RgbImage& image);
     /// Adds files, and those of folders; see read_radiance().
     void add_files(const std::vector<std::string>& files);
@@ -38,13 +38,15 @@ private:
     int tiles_;
     TileGrid grid_{};
     TileMoments moments_;
-    std::map<uint64_t, std::string> names_;  ///< By hashes of the pixels.
+    std::map<uint64_t, std::string> names_;  ///< By hashes of the pixels, without black images.
+    bool is_half_ = true;                    ///< Whether all values are half floats.
     std::string first_;
 };
 
 /// Tests image and tiles of two series, with `alpha` as in VerifyOptions. The report has one method, which stands for
 /// `images`; `spp` is unknown. Throws std::runtime_error where a series has fewer than two images or is black, and where
-/// their sizes differ or an image is in both.
+/// their sizes differ or an image that is not black is in both. Where all values of a
+/// series are half floats, that much more rounding is tolerated.
 VerifyReport verify_images(const ImageSeries& images, const ImageSeries& against, double alpha);
 
 }  // namespace etendue

@@ -27,11 +27,12 @@ void add_run(const TileMeans& means, TileMoments& moments) {
 
 void compare_tiles(const TileMoments& method, const TileMoments& reference,
                    const std::vector<double>& effective_counts, const TileGrid& grid,
-                   MethodReport& report) {
+                   MethodReport& report, double rounding) {
     for (size_t i = 0; i < method.size(); ++i)
         for (size_t k = 0; k < 3; ++k)
             (i + 1 < method.size() ? report.tiles : report.image)
-                .push_back(WelchTest::of(method[i][k], reference[i][k], effective_counts[i]));
+                .push_back(
+                    WelchTest::of(method[i][k], reference[i][k], effective_counts[i], rounding));
     // Contributions too rare for some tiles may be missing from others, which then seem well sampled but are too dark.
     // If there are too many such tiles, no tile is tested.
     const std::vector<double> pixels = pixels_of_tiles(grid);

@@ -20,9 +20,9 @@ TileMeans tile_means(const std::vector<Rgb>& image, const TileGrid& grid);
 void add_run(const TileMeans& means, TileMoments& moments);
 
 /// Adds the comparisons of tiles and image to the report. `effective_counts` are those of WelchTest, of every tile and the
-/// image.
+/// image, and so is `rounding`.
 void compare_tiles(const TileMoments& method, const TileMoments& reference,
                    const std::vector<double>& effective_counts, const TileGrid& grid,
-                   MethodReport& report);
+                   MethodReport& report, double rounding = WelchTest::kRounding);
 
 }  // namespace etendue

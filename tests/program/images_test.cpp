@@ -122,6 +122,26 @@ TEST_F(ImagesTest, ThatCannotBeTestedAreRefused) {
     expect_refusal(verify(path("broken.exr")), "broken.exr");
 }
 
+/// The results replace no image, and the verdict is told even if they cannot be written.
+TEST_F(ImagesTest, AreNotReplacedByResults) {
+    render_set("a", 1, 2);
+    render_set("b", 11, 2);
+    const auto arguments = [&](const std::string& json) {
+        return Arguments{"verify",    "--images", path("a/0.exr"), path("a/1.exr"),
+                         "--against", path("b"),  "--tiles",       "1",
+                         "--json",    json};
+    };
+    for (const char* file : {"a/1.exr", "b/0.exr"}) {
+        const std::string before = read_text(path(file));
+        expect_refusal(arguments(path(file)), "cannot be the same file");
+        EXPECT_EQ(read_text(path(file)), before);
+    }
+    const ProgramResult full = run(arguments("/dev/full"));
+    EXPECT_EQ(full.status, 1);
+    EXPECT_NE(full.output.find("verdict: "), std::string::npos) << full.output;
+    EXPECT_NE(full.errors.find("/dev/full"), std::string::npos) << full.errors;
+}
+
 TEST_F(ImagesTest, ArePartOfTheReport) {
     // Twice as bright, so that their error is known.
     for (int run = 1; run <= 2; ++run)
@@ -165,6 +185,22 @@ TEST_F(ImagesTest, ArePartOfTheReport) {
     EXPECT_GT(m["summary"]["mean_ratio"]["low_95"].get<double>(), 1);
     EXPECT_TRUE(fs::exists(path("report/cornell/other.exr")));
     EXPECT_NE(read_text(path("report/report.html")).find("\"other\""), std::string::npos);
+
+    // Names that would be those of other files of the report.
+    all = compare;
+    all.push_back("--images");
+    for (const char* name : {"reference", "a b", "a_b", "a_b-flip"})
+        all.push_back(name + ("=" + path("other")));
+    const ProgramResult named = run(all);
+    ASSERT_EQ(named.status, 0) << named.errors;
+    for (const char* name : {"reference-2", "a_b", "a_b-2", "a_b-flip-2"})
+        for (const char* end : {".exr", ".png", "-flip.png", "-relse.png"})
+            EXPECT_TRUE(fs::exists(path(fmt::format("report/cornell/{}{}", name, end))))
+                << name << end;
+    EXPECT_EQ(read_image(path("report/cornell/a_b.exr")).data,
+              read_image(path("report/cornell/reference-2.exr")).data);
+    EXPECT_NE(read_image(path("report/cornell/reference.exr")).data,
+              read_image(path("report/cornell/reference-2.exr")).data);
 
     const auto refuse = [&](const std::string& images, const std::string& message) {
         Arguments wrong = compare;

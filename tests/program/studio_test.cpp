@@ -728,6 +728,25 @@ TEST_F(StudioTest, FailsBeforeItServes) {
     expect({"studio", scene, "--runs", scene}, "--runs");
 }
 
+/// Another place of an orthographic camera leaves the size of what it shows.
+TEST_F(StudioTest, AnOrthographicViewShowsAsMuchElsewhere) {
+    std::ofstream(scene) << R"(<scene version="3.0.0"><sensor type="orthographic">
+        <transform name="to_world"><scale x="3" y="3"/><lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform>
+        </sensor><shape type="rectangle"><transform name="to_world"><scale value="2"/></transform></shape>
+        <shape type="rectangle"><transform name="to_world"><scale value="2"/><rotate y="1" angle="90"/></transform></shape>
+        <emitter type="constant"/></scene>)";
+    start();
+    const auto seen = [&](double x) {
+        // The points under a pixel: one where its ray meets a rectangle.
+        return post("/v1/ray", {{"x", int(20 + x * 20)}, {"y", 15}}).parsed()["points"].size();
+    };
+    EXPECT_GT(seen(0.5), seen(0.9));  // 1.5 of 2, and 2.7
+    const json camera{{"eye", {5, 0, 0}}, {"target", {0, 0, 0}}, {"up", {0, 1, 0}}};
+    EXPECT_EQ(post("/v1/run", {{"action", "view"}, {"camera", camera}}).status, 200);
+    EXPECT_TRUE(wait_for([&] { return get("/v1/state").parsed()["scene_version"] == 2; }));
+    EXPECT_GT(seen(0.5), seen(0.9));
+}
+
 TEST_F(StudioTest, SaysWhenTheSceneChangesAndLoadsItAgain) {
     start();
     const json old_run =
@@ -762,6 +781,15 @@ TEST_F(StudioTest, SaysWhenTheSceneChangesAndLoadsItAgain) {
     const json again = get("/v1/state").parsed();
     EXPECT_EQ(again["scene_version"], 2);
     EXPECT_EQ(again["load_error"], "");
+    // A request for another view loads the file, too.
+    const Connection later(port);
+    later.send(request);
+    std::ofstream(scene) << text << "  ";
+    const auto has_changed = [&] { return get("/v1/state").parsed()["scene_changed"] == true; };
+    EXPECT_TRUE(wait_for(has_changed));
+    EXPECT_EQ(post("/v1/run", {{"action", "view"}, {"sensor", 0}}).status, 200);
+    EXPECT_TRUE(wait_for([&] { return get("/v1/state").parsed()["scene_version"] == 3; }));
+    EXPECT_TRUE(wait_for([&] { return !has_changed(); }));
     const Answer stale = replay();
     EXPECT_EQ(stale.status, 409);
     EXPECT_NE(stale.body.find("earlier version"), std::string::npos) << stale.body;

@@ -1,6 +1,8 @@
 """Materials of USD: UsdPreviewSurface and its textures, standard_surface and OpenPBR of MaterialX."""
 
 import re
+import subprocess
+import sys
 import zlib
 from pathlib import Path
 from struct import pack
@@ -10,7 +12,7 @@ import pytest
 
 pytest.importorskip("pxr", reason="usd-core is not installed")
 
-from usd_stages import CAMERA, expect_same, image, load, write
+from usd_stages import CAMERA, FLOOR, expect_same, image, load, write
 
 import etendue as et
 
@@ -212,6 +214,30 @@ def test_packages_hold_their_textures(tmp_path: Path) -> None:
     packed = et.load(tmp_path / "scene.usdz")
     assert packed["/Quad.emitter.radiance"]["image"]["bytes"].startswith(b"\x89PNG")
     expect_same(image(packed), image(et.load(file)), 1e-6)
+
+
+def test_domes_of_packages_become_files(tmp_path: Path) -> None:
+    """A description keeps the image of a dome, and so does the XML that another process has made of the package."""
+    from pxr import UsdUtils
+    pixels = np.full((8, 16, 3), 0.1, np.float32)
+    pixels[2, 3] = (40, 20, 10)
+    et.write_image(tmp_path / "sky.exr", pixels)
+    text = 'def DomeLight "Dome" { asset inputs:texture:file = @sky.exr@\ncolor3f inputs:color = (1, 0.5, 0.25) }\n'
+    file = write(tmp_path, CAMERA + text + FLOOR)
+    assert UsdUtils.CreateNewUsdzPackage(str(file), str(tmp_path / "scene.usdz"))
+    expected = image(et.load(file))
+    packed = et.load(tmp_path / "scene.usdz")
+    assert packed["/Dome.image"]["bytes"] == (tmp_path / "sky.exr").read_bytes()
+    expect_same(image(packed), expected, 1e-6)
+    expect_same(image(et.load_dict(packed.to_dict())), expected, 1e-6)
+    for target in ("scene.xml", "plain.xml"):
+        (tmp_path / "out").mkdir(exist_ok=True)
+        if target == "scene.xml":
+            subprocess.run([sys.executable, "-m", "etendue.usd", tmp_path / "scene.usdz", tmp_path / "out" / target], check=True)
+        else:
+            packed.save(tmp_path / "out" / target, mitsuba=True)
+        expect_same(image(et.load(tmp_path / "out" / target)), expected, 1e-5)
+    assert list((tmp_path / "out" / "scene_files").glob("*.exr"))
 
 
 def test_missing_images_are_warnings(tmp_path: Path) -> None:

@@ -491,6 +491,16 @@ async function pathPart() {
         const series = await browser.evaluate(`studio.server.get('/v1/gain?without=${without[0]}&with=${with_[0]}')`);
         check(gain.includes(`1/${Number(series.gain[0].toPrecision(3))} of the time`), `the gain is that of the paths: ${series.gain}`);
         check(await browser.evaluate("[...document.querySelectorAll('#editor tr')].find(r => r.textContent.startsWith('user path')).children[1].textContent") === '–', 'the run without them has no user paths');
+        // A region is rendered with the same paths.
+        await browser.evaluate("document.getElementById('tab-image').click()");
+        await browser.evaluate(`document.querySelector('[aria-label="Show run ${with_[0]}"]').click()`);
+        await browser.evaluate('(() => { studio.view.corner = [2, 3]; studio.view.moveCursor(21, 17); })()');
+        await browser.until("!document.getElementById('render-region').disabled", 'a region is selected');
+        await browser.evaluate("document.getElementById('render-region').click()");
+        await browser.until(`studio.state().scene?.width === 20 && studio.shown[0].run > ${with_[0]} && studio.shown[0].passes > 0`, 'the region is rendered', 150);
+        const again = await browser.evaluate('studio.runs.get(studio.shown[0].run).integrator');
+        check(again === with_[1], `with the same paths: ${again}`);
+
         check(await studio.stop() === 0, 'Ctrl-C ends with exit code 0');
         check(existsSync(join(folder, 'mirror-1.exr')), 'and writes the images');
     } finally {

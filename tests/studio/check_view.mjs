@@ -95,6 +95,7 @@ async function renderedPart(browser) {
     await browser.evaluate('studio.space().orbit(0.5, -0.2)');
     await browser.settle();
     await browser.screenshot('view-5-orbit');
+    await browser.evaluate(`(() => { const {server} = studio, post = server.post; server.post = function(path, body) { if (body.camera) window.sentCamera = body.camera; return post.call(server, path, body); }; })()`);
     await browser.evaluate(press('render-view'));
     await browser.until('studio.state().scene?.has_own_camera && studio.shown[0].run === 4 && studio.shown[0].passes > 4', 'the view is rendered', 150);
     await browser.settle();
@@ -102,6 +103,9 @@ async function renderedPart(browser) {
     await browser.screenshot('view-6-camera');
     const eye = await browser.evaluate('[studio.state().scene.eye, studio.space().eye()]');
     check(Math.hypot(...eye[0].map((v, i) => v - eye[1][i])) < 1e-3, `the camera is where the view was: ${eye[0].map(v => v.toFixed(3))}`);
+    const [distance, radius] = await browser.evaluate('[Math.hypot(...sentCamera.target.map((v, i) => v - sentCamera.eye[i])), studio.space().radius]');
+    check(Math.abs(distance - radius) < 1e-3 * radius, `its target is as far as the scene is large: ${distance}`);
+    await browser.evaluate('delete studio.server.post');
     await browser.evaluate(press('file-camera'));
     await browser.until('studio.state().scene && !studio.state().scene.has_own_camera && studio.shown[0].run === 5 && studio.shown[0].passes > 1', 'the camera of the file again', 150);
 
@@ -122,9 +126,65 @@ async function renderedPart(browser) {
     }
     check(differs(seen[0], seen[1]) && differs(seen[1], seen[2]), 'relative, signed and squared differences look different');
     await browser.screenshot('view-7-squared');
+
+    // A pixel of the second picture that is not a number.
+    for (const mode of [0, 2, 3, 4]) {
+        const color = await browser.evaluate(`(() => {
+            const {view} = studio, picture = (...halves) => ({channels: 1, scale: 0, columns: 2, rows: 1, halves: new Uint16Array(halves)});
+            view.show(0, picture(0x3c00, 0x3c00));
+            view.show(1, picture(0x3c00, 0x7e00));
+            [view.mode, view.wipe] = [${mode}, 1];
+            view.draw(false);
+            const out = new Uint8Array(4), {gl, canvas} = view;
+            gl.readPixels(Math.round(canvas.width / 2 + view.scale() * view.width / 4), Math.round(canvas.height / 2), 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, out);
+            return [...out];
+        })()`);
+        const isMarked = color[0] === 255 && color[1] === 0 && color[2] === 255;
+        check(isMarked === (mode > 0), `in mode ${mode} what is not a number has the colour ${color}`);
+    }
+}
+
+/// A part of the image that the command line gives; two runs, of which the earlier one has the worst pixels.
+async function partPart(browser) {
+    await browser.until('studio.state()?.scene?.width === 20 && studio.shown[0].passes >= 8', 'a part of the image');
+    await browser.evaluate(press('find-worst'));
+    await browser.until("document.querySelectorAll('#worst .replayed button').length === 20", 'its worst pixels');
+    await browser.evaluate("studio.server.post('/v1/run', {action: 'start', integrator: 'bdpt'})");
+    await browser.until("studio.runs.get(2)?.passes > 1", 'another run');
+    await browser.evaluate(`document.querySelector('[aria-label="Show run 2"]').click()`);
+    await browser.until('studio.shown[0].run === 2 && studio.shown[0].passes > 0', 'it is shown');
+    await browser.evaluate("document.querySelector('#worst .replayed button').click()");
+    await browser.until('studio.inspector()?.paths.length > 0 && studio.inspector().chosen === 0', 'the pixel is traced again', 150);
+    const runs = await browser.evaluate('[studio.inspector().pixel.run, studio.inspector().of, studio.shown[0].run]');
+    check(runs.every(r => r === 1), `in its own run, which is shown: ${runs}`);
+
+    // What is superseded does not go on. Its pixel would be so bright that splats were asked for.
+    const late = await browser.evaluate(`(async () => {
+        const i = studio.inspector(), {server} = studio, post = server.post;
+        let requests = 0;
+        server.post = function(...a) { ++requests; return post.apply(server, a); };
+        await Promise.all([i.replayPass(0, 1e9), i.replay(1)]);
+        delete server.post;
+        return {requests, splats: i.splats.checked, chosen: i.chosen};
+    })()`);
+    check(late.requests === 2 && !late.splats && late.chosen === -1, `a later request ends an earlier one: ${JSON.stringify(late)}`);
+
+    await browser.evaluate("document.getElementById('tab-image').click()");
+    await browser.evaluate(press('render-whole'));
+    await browser.until('studio.state().scene?.width === 80 && studio.shown[0].run === 3 && studio.shown[0].passes > 1', 'the whole image', 150);
 }
 
 await runParts(async () => {
+    const studio = await Studio.start(file, '-i', 'path', '--crop', '30,20,20,15');
+    const browser = openBrowser();
+    try {
+        await browser.open(studio.url);
+        await partPart(browser);
+    } finally {
+        browser.close();
+        await studio.stop();
+    }
+}, async () => {
     const studio = await Studio.start(file, '-i', 'path');
     const browser = openBrowser();
     try {

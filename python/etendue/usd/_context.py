@@ -1,8 +1,6 @@
 """What all parts of the reader share: the stage, the options, the objects read so far, and messages."""
 
-import hashlib
 import os
-import tempfile
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -14,8 +12,6 @@ from .._etendue import SceneError
 
 Matrix = NDArray[np.float64]
 Object = dict[str, Any]  # An object in the format of et.load_dict().
-
-_folder: tempfile.TemporaryDirectory[str] | None = None
 
 
 @dataclass
@@ -81,19 +77,6 @@ class Context:
         attribute = prim.GetAttribute(name)
         value = attribute.Get(self.time) if attribute else None
         return default if value is None else value
-
-    def unpacked(self, image: Object) -> str:
-        """The name of a file with the bytes of an image, for parameters that cannot hold them. The file exists as long as the
-        process."""
-        global _folder
-        if _folder is None:
-            _folder = tempfile.TemporaryDirectory(prefix="etendue-usd-")
-        digest = hashlib.sha256(image["bytes"]).hexdigest()[:16]
-        name = os.path.join(_folder.name, digest + os.path.splitext(image["name"].rstrip("]"))[1])
-        if not os.path.exists(name):
-            with open(name, "wb") as f:
-                f.write(image["bytes"])
-        return name
 
     def stage_matrix(self, prim: Any) -> Matrix:
         """From the space of a prim to that of the stage."""

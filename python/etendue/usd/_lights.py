@@ -191,8 +191,6 @@ def _dome(context: Context, prim: Any, to_scene: Matrix) -> Object | None:
     if layout not in ("automatic", "latlong"):
         context.refuse(prim, f'a dome whose texture has the format "{layout}" is not supported')
         return None
-    if "filename" not in image:
-        image = {"filename": context.unpacked(image["image"])}
     place = unscaled(to_scene)
     if place is None:
         context.fail(prim, "the light's transform has no inverse")

@@ -3,6 +3,7 @@
 
 /** @typedef {import('./server.js').Picture} Picture */
 
+/** Of all but the largest value, at most about so many pixels are looked at. */
 const kMostSamples = 65536;
 /** Stops of the first and last bin, and bins for each stop. */
 const kLow = -20, kHigh = 20, kBins = 2;
@@ -19,16 +20,39 @@ export function fromHalf(h) {
  * `percentile`: the 95th; `dark` and `bad`: shares of the pixels that are not above 0, and not finite.
  */
 
+/** The values of all half floats, by their bits. @type {Float32Array | null} */
+let values16 = null;
+const allHalves = () => values16 ??= Float32Array.from({length: 65536}, (_, h) => fromHalf(h));
+
+/** @param {number} a @param {number} b @returns {number} */
+const commonDivisor = (a, b) => b === 0 ? a : commonDivisor(b, a % b);
+
+/**
+ * The largest finite luminance of all pixels, without the scale; 0 where there is none.
+ * @param {Picture} picture
+ */
+function largestOf({channels, halves}) {
+    const value = allHalves();
+    let largest = -Infinity;
+    for (let i = 0; i < halves.length; i += channels) {
+        const y = channels === 1 ? value[halves[i]] : 0.2126 * value[halves[i]] + 0.7152 * value[halves[i + 1]] + 0.0722 * value[halves[i + 2]];
+        if (y > largest && y < Infinity) largest = y;
+    }
+    return largest === -Infinity ? 0 : largest;
+}
+
 /** @param {Picture} picture @returns {Histogram} */
 export function histogramOf(picture) {
-    const {channels, halves, scale} = picture, pixels = halves.length / channels;
-    const step = Math.max(1, Math.floor(pixels / kMostSamples)), factor = 2 ** scale;
+    const {channels, columns, halves, scale} = picture, pixels = halves.length / channels, value = allHalves(), factor = 2 ** scale;
+    let step = Math.max(1, Math.floor(pixels / kMostSamples));
+    // The sample has all columns.
+    while (commonDivisor(step, columns) > 1) ++step;
     /** @type {number[]} */
     const values = [];
     const bins = Array.from({length: kBins * (kHigh - kLow)}, () => 0);
     let dark = 0, bad = 0, count = 0;
     for (let i = 0; i < pixels; i += step, ++count) {
-        const v = (/** @type {number} */ c) => fromHalf(halves[channels * i + c]);
+        const v = (/** @type {number} */ c) => value[halves[channels * i + c]];
         const y = factor * (channels === 1 ? v(0) : 0.2126 * v(0) + 0.7152 * v(1) + 0.0722 * v(2));
         if (!Number.isFinite(y)) { ++bad; continue; }
         values.push(y);
@@ -37,7 +61,7 @@ export function histogramOf(picture) {
     }
     values.sort((a, b) => a - b);
     return {bins: bins.map(n => n / Math.max(1, count)), low: kLow, high: kHigh, dark: dark / Math.max(1, count), bad: bad / Math.max(1, count),
-        percentile: values[Math.floor(0.95 * (values.length - 1))] ?? 0, largest: values[values.length - 1] ?? 0};
+        percentile: values[Math.floor(0.95 * (values.length - 1))] ?? 0, largest: factor * largestOf(picture)};
 }
 
 /**

@@ -58,18 +58,21 @@ export class Inspector {
      */
     async replayPass(pass, value) {
         this.splats.checked = false;
-        await this.replay(pass);
+        if (!await this.replay(pass)) return;
         const luminance = (/** @type {number[]} */ v) => 0.2126 * v[0] + 0.7152 * v[1] + 0.0722 * v[2];
         if (this.of > 0 && this.message.className === '' && luminance(this.sum) < 0.5 * value) {
             this.splats.checked = true;
-            await this.replay(pass);
+            if (!await this.replay(pass)) return;
         }
         if (this.paths.length === 0) return;
         this.chosen = 0;
         this.update();
     }
 
-    /** @param {number} [pass] Only this pass. */
+    /**
+     * Tells whether nothing else was asked for in the meantime.
+     * @param {number} [pass] Only this pass.
+     */
     async replay(pass) {
         const request = ++this.request, {x, y, run} = this.pixel;
         this.of = run;
@@ -78,19 +81,20 @@ export class Inspector {
         this.message.textContent = 'tracing, or waiting for the end of the pass …';
         try {
             const r = await this.server.post('/v1/replay', {x, y, run, pass: pass ?? 0, passes: pass === undefined ? Number(this.passes.value) : 1, splats: this.splats.checked});
-            if (request !== this.request) return;
+            if (request !== this.request) return false;
             this.paths = r.paths;
             this.sum = r.sum;
             const sum = r.sum.map((/** @type {number} */ v) => significant(v / Math.max(1, r.passes), 4)).join(', ');
             this.message.textContent = `pixel (${x}, ${y}): ${r.paths.length} paths of ${r.is_last_pass ? 'the last pass' : pass !== undefined ? `pass ${pass}` : `${r.passes} passes`}${r.left_out ? `, ${r.left_out} left out` : ''}; mean without splats (${sum})`
                 + (r.light_paths ? `; ${r.light_paths} light paths` : '');
         } catch (e) {
-            if (request !== this.request) return;
+            if (request !== this.request) return false;
             this.paths = [];
             this.message.className = 'error';
             this.message.textContent = /** @type {Error} */ (e).message;
         }
         this.fill();
+        return true;
     }
 
     fill() {

@@ -186,14 +186,18 @@ function showHistogram() {
 // ---------------------------------------------------------------------------------------- worst pixels
 
 /**
- * Traces again what made a pixel bright in its brightest pass.
- * @param {any} worst As the program describes it.
+ * Traces again what made a pixel of a run bright in its brightest pass, and shows the run.
+ * @param {number} run @param {any} worst As the program describes it.
  */
-async function traceWorst({x, y, pass, value}) {
+async function traceWorst(run, {x, y, pass, value}) {
+    if (shown[0].run !== run) {
+        showIn(0, run, 'image');
+        tools.view.value = 'image';
+    }
     view.corner = null;
     view.moveCursor(x, y);
     showPane('paths');
-    inspector?.setPixel(x, y, shown[0].run);
+    inspector?.setPixel(x, y, run);
     await inspector?.replayPass(pass, value);
 }
 
@@ -207,7 +211,7 @@ async function listWorst() {
         const {passes, pixels} = await server.get(`/v1/worst?run=${run}&count=20`);
         tools.worstText.textContent = pixels.length > 0 ? `run ${run}, ${passes} passes: what one pass made of the pixel` : `run ${run}: nothing is known, as of chains, of several seeds, and before the second pass`;
         list.replaceChildren(...pixels.map((/** @type {any} */ w) => element('button', {type: 'button', textContent: `(${w.x}, ${w.y}) pass ${w.pass}: ${percent(w.share)}, luminance ${significant(w.value, 3)}`,
-            title: 'Trace its paths in this pass again', onclick: () => { traceWorst(w); }, onfocus: () => { view.corner = null; view.moveCursor(w.x, w.y); }})));
+            title: 'Trace its paths in this pass again', onclick: () => { traceWorst(run, w); }, onfocus: () => { view.corner = null; view.moveCursor(w.x, w.y); }})));
     } catch (e) {
         tools.worstText.textContent = /** @type {Error} */ (e).message;
     }
@@ -230,7 +234,7 @@ async function changeView(change) {
     await server.post('/v1/run', {action: 'view', ...change});
     afterLoad = async () => {
         // Files are named, not addressed.
-        const integrator = (run?.integrator ?? '').replace(/,?user_paths=[^,]*/, '');
+        const integrator = (run?.integrator ?? '').replace(/user_paths=[^,]*\//, 'user_paths=');
         await begin({action: 'start', integrator, ...(run?.sampler ? {sampler: run.sampler} : {})});
         banner('image', '');
     };
@@ -240,6 +244,12 @@ async function changeView(change) {
 function renderRegion() {
     const {x, y, w, h} = view.selected(), [cx, cy] = state.scene.crop;
     if (w * h > 1) report(changeView({crop: {x: x + cx, y: y + cy, w, h}}));
+}
+
+/** The whole image: without a rectangle, it would be the part that the file or the command line says. */
+function whole() {
+    const [w, h] = state.scene.whole;
+    return {x: 0, y: 0, w, h};
 }
 
 async function savePicture() {
@@ -277,13 +287,15 @@ async function showPixel() {
     await describePixel(shown[0]);
     await describePixel(shown[1]);
     // The run may have been removed meanwhile.
-    if (isPixel && runs.has(shown[0].run)) {
-        const {pixel} = await server.get(`/v1/worst?run=${shown[0].run}&x=${x}&y=${y}`).catch(() => ({pixel: null}));
+    const run = shown[0].run;
+    if (isPixel && runs.has(run)) {
+        const {pixel} = await server.get(`/v1/worst?run=${run}&x=${x}&y=${y}`).catch(() => ({pixel: null}));
         if (pixel) parts.push(element('div', {className: 'bar'}, [element('span', {className: 'soft', textContent: `brightest in pass ${pixel.pass}: ${percent(pixel.share)} of its sum`}),
-            element('button', {type: 'button', id: 'trace-brightest', textContent: 'Trace it', onclick: () => { traceWorst(pixel); }})]));
+            element('button', {type: 'button', id: 'trace-brightest', textContent: 'Trace it', onclick: () => { traceWorst(run, pixel); }})]));
     }
+    if (request !== pixelRequest) return;
     tools.region.disabled = w * h === 1;
-    if (request === pixelRequest) at('pixel').replaceChildren(...parts);
+    at('pixel').replaceChildren(...parts);
     inspector?.setPixel(view.cursor[0], view.cursor[1], shown[0].run);
 }
 
@@ -321,7 +333,7 @@ function makeTools() {
         ['sRGB', 'ACES', 'Reinhard'].map((t, i) => element('option', {value: i, textContent: t})));
     tools.auto = element('button', {type: 'button', id: 'auto-exposure', textContent: 'Auto', title: 'The exposure that fits the image', onclick: () => { if (histogram) setExposure(exposureFor(histogram)); }});
     tools.region = element('button', {type: 'button', id: 'render-region', textContent: 'Render region', title: 'Render the selected rectangle alone', disabled: true, onclick: renderRegion});
-    tools.whole = element('button', {type: 'button', id: 'render-whole', textContent: 'Render all', title: 'Render the whole image again', hidden: true, onclick: () => report(changeView({crop: null}))});
+    tools.whole = element('button', {type: 'button', id: 'render-whole', textContent: 'Render all', title: 'Render the whole image again', hidden: true, onclick: () => report(changeView({crop: whole()}))});
     tools.camera = element('button', {type: 'button', id: 'file-camera', textContent: 'Camera of the file', title: 'Put the camera back', hidden: true, onclick: () => report(changeView({camera: null}))});
     tools.sensor = element('select', {id: 'sensor', onchange: () => report(changeView({sensor: Number(tools.sensor.value)}))});
     tools.sensorLabel = element('label', {hidden: true}, ['sensor ', tools.sensor]);

@@ -121,7 +121,7 @@ export class Space {
         toolbar.append(
             element('button', {type: 'button', textContent: 'Camera', title: 'Look as the camera does', onclick: () => this.lookAsCamera()}),
             element('button', {type: 'button', textContent: 'From outside', title: 'Look from outside the scene', onclick: () => this.lookFromOutside()}),
-            element('button', {type: 'button', id: 'render-view', textContent: 'Render this view', title: 'Put the camera of the scene here, and render', onclick: () => this.tell.render({eye: this.eye(), target: add(this.eye(), this.forward()), up: [0, 1, 0]})}),
+            element('button', {type: 'button', id: 'render-view', textContent: 'Render this view', title: 'Put the camera of the scene here, and render', onclick: () => this.tell.render({eye: this.eye(), target: add(this.eye(), this.forward(), this.radius), up: [0, 1, 0]})}),
             element('label', {title: 'Leave out what is nearer than this'}, ['cut away ', this.cutInput]));
         this.lookAsCamera();
         const gl = canvas.getContext('webgl2', {antialias: true, preserveDrawingBuffer: true});

@@ -30,6 +30,7 @@ vec3 srgb(vec3 v) {
     v = clamp(v, 0.0, 1.0);
     return mix(12.92 * v, 1.055 * pow(v, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, v));
 }
+bool isBad(vec3 v) { return any(isnan(v)) || any(isinf(v)); }
 float luminance(vec3 v) { return dot(v, vec3(0.2126, 0.7152, 0.0722)); }
 // Black, blue, violet, orange, yellow, white.
 vec3 heat(float x) {
@@ -73,7 +74,7 @@ void main() {
     } else {
         color = vec4(srgb(toneMapped(v)), 1.0);
     }
-    if (any(isnan(v)) || any(isinf(v))) color = vec4(1.0, 0.0, 1.0, 1.0);
+    if (isBad(v) || (mode >= 2 && (isBad(a) || isBad(b)))) color = vec4(1.0, 0.0, 1.0, 1.0);
     if (!hasMarks) return;
     float scale = size.x / extent.x;
     if (hasSecond && mode < 2 && abs(at.x - wipe) * size.x < 1.0) color = vec4(1.0);

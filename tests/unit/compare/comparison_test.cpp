@@ -249,6 +249,26 @@ TEST(Turns, RefuseUnknownAndRepeatedMethods) {
     EXPECT_THROW(check_methods(specs({"path", "bdpt", "path"})), std::runtime_error);
 }
 
+/// Of runs that have different lengths, as those of another program may, each has the same error times time.
+TEST(Summary, EfficiencyIsOfTheRunsAndNotOfTheirMeans) {
+    const auto method = [](const char* name, std::vector<double> seconds) {
+        Method m;
+        m.spec.name = name;
+        for (const double t : seconds) {
+            etendue::Run& run = m.runs.emplace_back();
+            run.seconds = t;
+            run.checkpoints.push_back({1, t, {}});
+            run.checkpoints.back().errors.rel_mse = 1 / t;
+        }
+        return m;
+    };
+    Comparison c;
+    c.methods = {method("equal", {2, 2}), method("different", {1, 4})};
+    const std::vector<MethodSummary> summaries = summarize(c);
+    EXPECT_NEAR(summaries[1].efficiency->value, 1, 1e-12);
+    EXPECT_NEAR(summaries[1].efficiency->interval->low, 1, 1e-12);
+}
+
 TEST(MeanRatio, IntervalHoldsOneForAnUnbiasedMethod) {
     const Scene scene = small_scene();
     const TemporaryFolder folder;

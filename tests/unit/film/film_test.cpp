@@ -6,7 +6,9 @@
 #include <random>
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
+#include "film/thread_arena.h"
 #include "math/statistics.h"
 #include "thread_ranks.h"
 
@@ -401,6 +403,44 @@ TEST(Film, PassesAfterADroppedOneAreAsWithoutIt) {
         return Totals(film, true);
     };
     totals(true).expect_same_bits(totals(false));
+}
+
+/// The largest passes are those of the differences of the totals, for any number of threads.
+TEST(Film, NotesTheBrightestPassOfEachPixel) {
+    constexpr int kPasses = 10;
+    constexpr FilmGeometry kLarge{130, 100, 0, 0, 130, 100};
+    std::vector<LargestPass> first;
+    const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, 8);
+    for (const int threads : {1, 7}) {
+        SCOPED_TRACE(threads);
+        ThreadArena arena(threads);
+        arena.execute([&] {
+            Film film(kLarge, ReconstructionFilter::box());
+            EXPECT_TRUE(film.largest().empty());
+            film.keep_largest();
+            Passes passes(film);
+            std::vector<LargestPass> expected(kLarge.pixel_count());
+            for (uint32_t pass = 0; pass < kPasses; ++pass) {
+                const std::vector<Film::Moments> before(film.moments().begin(),
+                                                        film.moments().end());
+                passes.add(pass % 2 == 0 ? 500 : 0);
+                for (size_t i = 0; i < expected.size(); ++i) {
+                    const float value =
+                        film.moments()[i].luminance_sum() - before[i].luminance_sum();
+                    if (value > expected[i].luminance) expected[i] = {value, pass};
+                }
+            }
+            ASSERT_EQ(film.largest().size(), expected.size());
+            for (size_t i = 0; i < expected.size(); ++i) {
+                const auto [luminance, pass] = film.largest()[i];
+                ASSERT_EQ(pass, expected[i].pass) << i;
+                ASSERT_NEAR(luminance, expected[i].luminance, 1e-5f * luminance) << i;
+            }
+            if (first.empty()) first.assign(film.largest().begin(), film.largest().end());
+            for (size_t i = 0; i < first.size(); ++i)
+                ASSERT_EQ(film.largest()[i].luminance, first[i].luminance) << i;
+        });
+    }
 }
 
 /// Several processes, each of which adds up some of the pixels, if there are enough of them.

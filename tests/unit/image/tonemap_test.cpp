@@ -28,6 +28,18 @@ TEST(ToneMap, SrgbClampsAfterExposure) {
     EXPECT_EQ(mapped(Rgb(0.5f), {.exposure = -2}), Rgb(0.125f));
 }
 
+/// No factor is infinite or zero, so that black stays black and infinity white.
+TEST(ToneMap, AnyExposureHasAColour) {
+    for (const ToneOperator op : {ToneOperator::Srgb, ToneOperator::Reinhard, ToneOperator::Aces})
+        for (const float exposure : {-kInfinity, -1000.0f, 128.0f, 1000.0f, kInfinity}) {
+            SCOPED_TRACE(exposure);
+            EXPECT_EQ(mapped(Rgb(0), {.op = op, .exposure = exposure}), Rgb(0));
+            EXPECT_EQ(mapped(Rgb(kInfinity), {.op = op, .exposure = exposure}), Rgb(1));
+        }
+    EXPECT_EQ(mapped(Rgb(1e-20f), {.exposure = 1000}), Rgb(1));
+    EXPECT_LT(mapped(Rgb(1), {.exposure = -1000}).g, 1e-30f);
+}
+
 TEST(ToneMap, ReinhardMapsWhiteToOneAndKeepsHues) {
     const ToneMapping mapping = {.op = ToneOperator::Reinhard, .white = 4};
     EXPECT_NEAR(mapped(Rgb(4), mapping).g, 1, 1e-6);

@@ -219,6 +219,22 @@ TEST_F(KeptRuns, NeedAFolder) {
     EXPECT_THROW(session->open("test-path-1.etd", [](const Opened&) {}), std::runtime_error);
 }
 
+/// Seeds that are shorter than the time between two files do not keep a run from being saved.
+TEST_F(KeptRuns, OfShortSeedsAreKeptWhileTheyRender) {
+    open_session(0.2);
+    RunRequest several = run_of("path", 32);
+    several.seeds = 64;
+    const int run = session->start(several);
+    RunStatus s;
+    EXPECT_TRUE(wait_for([&] {
+        s = session->status(run);
+        return s.file_passes > 0 || s.state != RunState::Rendering;
+    }));
+    EXPECT_EQ(s.state, RunState::Rendering) << s.message;
+    EXPECT_GT(s.file_passes, 0u) << s.file_problem;
+    session->discard(run);
+}
+
 /// Opened in another session, a run with several seeds has the same images, and goes on with more seeds.
 TEST_F(KeptRuns, OfSeveralSeedsGoOn) {
     RunRequest several = run_of("path", 4);

@@ -2,6 +2,7 @@
 
 #include "verify/image_series.h"
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -120,6 +121,52 @@ TEST(ImageSeries, TestsTheChannelsThatHaveLight) {
     const VerifyReport report = verify_images(series(1, 64, yellow), series(2, 64, yellow), 0.01);
     EXPECT_EQ(verdict(report), Verdict::Consistent);
     EXPECT_EQ(report.tests, 2 * 17);
+}
+
+/// The image with values of 16 bits, as many programs write them.
+RgbImage in_halves(RgbImage image) {
+    for (Rgb& c : image.pixels) c = {float(Half(c.r)), float(Half(c.g)), float(Half(c.b))};
+    return image;
+}
+
+/// All of the image but a pixel is a lamp, whose radiance has no noise but the error of rounding.
+TEST(ImageSeries, ToleratesTheRoundingOfHalfFloats) {
+    // Halfway between two half floats, nearly.
+    const auto lamp = [](uint64_t seed, float radiance) {
+        RgbImage image = noisy_image(seed);
+        for (size_t i = 0; i + 1 < image.pixels.size(); ++i) image.pixels[i] = Rgb(radiance);
+        // So that the images are not the same.
+        image.pixels.back() = Rgb(radiance) + image.pixels.back() * 1e-3f;
+        return image;
+    };
+    const auto right = [&](uint64_t seed) { return lamp(seed, 1.00048f); };
+    const auto rounded = [&](uint64_t seed) { return in_halves(lamp(seed, 1.00048f)); };
+    // The two programs differ by less than what separates two half floats.
+    const auto other = [&](uint64_t seed) { return in_halves(lamp(seed, 1.0005f)); };
+    for (const auto& [a, b] : std::vector<std::array<std::function<RgbImage(uint64_t)>, 2>>{
+             {rounded, right}, {right, rounded}, {rounded, other}}) {
+        const VerifyReport report = verify_images(series(1, 8, a), series(2, 8, b), 0.01);
+        EXPECT_NE(verdict(report), Verdict::Deviates);
+        // What is tolerated is no error that would have been found.
+        for (const WelchTest& t : report.methods.front().tiles)
+            EXPECT_GE(t.detectable(report.level), WelchTest::kHalfRounding);
+    }
+    const auto wrong = [&](uint64_t seed) { return in_halves(lamp(seed, 1.003f)); };
+    EXPECT_EQ(verdict(verify_images(series(1, 8, wrong), series(2, 8, right), 0.01)),
+              Verdict::Deviates);
+    // Without halves, the tolerance is that of single precision.
+    const auto brighter = [&](uint64_t seed) { return lamp(seed, 1.0009f); };
+    EXPECT_EQ(verdict(verify_images(series(1, 8, brighter), series(2, 8, right), 0.01)),
+              Verdict::Deviates);
+}
+
+/// Some images of a caustic that is seldom found have nothing of it.
+TEST(ImageSeries, ComparesSetsThatBothHaveBlackImages) {
+    const auto rare = [](uint64_t seed) {
+        return seed % 1000 < 2 ? noisy_image(0, 0) : noisy_image(seed);
+    };
+    EXPECT_NE(verdict(verify_images(series(1, 8, rare), series(2, 8, rare), 0.01)),
+              Verdict::Deviates);
 }
 
 std::string refusal(const std::function<void()>& task) {
