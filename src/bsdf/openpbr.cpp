@@ -65,16 +65,9 @@ Rgb OpenPbrLobe::fresnel(float cos_m) const {
 }
 
 /// 2 ∫ F μ dμ = F0 + (1 − F0)/21 − dip/126, and the series over the reflections.
-Rgb OpenPbrLobe::interreflected() const {
+Rgb OpenPbrLobe::interreflected(float lost) const {
     const Rgb F = at_least_zero(lerp(1 / 21.0f, color, Rgb(1)) - dip(color, tint) / 126.0f);
-    const float lost = table->mean(OpenPbrTable::kBase, mean_row());
     return F * F * (1 - lost) / (Rgb(1) - F * lost);
-}
-
-GlassShares OpenPbrLobe::shares() const {
-    const OpenPbrTable::Row r = mean_row();
-    return glass_shares(eta, table->mean(OpenPbrTable::kBase, r),
-                        table->mean(OpenPbrTable::kBaseBelow, r));
 }
 
 Rgb OpenPbrLobe::excess_color() const {
@@ -114,34 +107,35 @@ OpenPbrLobe::End OpenPbrLobe::end(Vec3 w) const {
     return e;
 }
 
-float OpenPbrLobe::facet_probability(const End& e) const {
-    if (slab == OpenPbrSlab::Opaque) {
-        const float facets = e.base * tint.max(),
-                    diffuse =
-                        (1 - e.base) *
-                        std::fmax(color.max(), table->interreflection(mean_row()) * tint.max());
-        return facets > 0 ? facets / (facets + diffuse) : 0;
-    }
-    return 1 - e.base;
+float OpenPbrLobe::facet_probability(const End& e, float interreflection) const {
+    if (slab != OpenPbrSlab::Opaque) return 1 - e.base;
+    const float top = tint.max(), facets = e.base * top,
+                diffuse = (1 - e.base) * std::fmax(color.max(), interreflection * top);
+    return facets > 0 ? facets / (facets + diffuse) : 0;
 }
 
-bool OpenPbrLobe::facet(Vec3 wo, Vec3 wi, float& cos_m, float& quarter_D) const {
-    const Vec3 h = wo + wi, m = h / length(h);
-    if (!(m.z > 0)) return false;  // opposite grazing directions: not resolved by float
-    cos_m = dot(wo, m);
-    quarter_D = 0.25f * facets().D(m);
-    return true;
+float OpenPbrLobe::facet_probability(const End& e) const {
+    return facet_probability(e, slab == OpenPbrSlab::Opaque ? table->interreflection(mean_row())
+                                                            : 0.0f);
+}
+
+BsdfEval OpenPbrLobe::eval_facets(const End& o, const End& i, float p_o, float p_i) const {
+    const Vec3 h = o.w + i.w, m = h / length(h);
+    if (!(m.z > 0)) return {};  // opposite grazing directions: not resolved by float
+    const Microfacet distribution = facets();
+    const float quarter_D = 0.25f * distribution.D(m), pdf = quarter_D / distribution.sigma(o.w),
+                sigma_i = distribution.sigma(i.w);
+    return {fresnel(dot(o.w, m)) * (pdf * i.cos / sigma_i), p_o * pdf, p_i * quarter_D / sigma_i};
 }
 
 BsdfEval OpenPbrLobe::eval_metal(const End& o, const End& i) const {
-    float cos_m, quarter_D;
-    if (has_smooth_facets() || !facet(o.w, i.w, cos_m, quarter_D)) return {};
-    const float sigma_o = facets().sigma(o.w), sigma_i = facets().sigma(i.w);
-    BsdfEval e{.f = fresnel(cos_m) * (quarter_D * i.cos / (sigma_o * sigma_i)),
-               .pdf = (1 - o.base) * quarter_D / sigma_o + o.base * i.cos * kInvPi,
-               .pdf_rev = (1 - i.base) * quarter_D / sigma_i + i.base * o.cos * kInvPi};
+    if (has_smooth_facets()) return {};
+    BsdfEval e = eval_facets(o, i, 1 - o.base, 1 - i.base);
     const float lost = table->mean(OpenPbrTable::kBase, mean_row());
-    if (lost > 0) e.f += interreflected() * (o.base * i.base / lost * i.cos * kInvPi);
+    if (!(lost > 0)) return e;
+    e.f += interreflected(lost) * (o.base * i.base / lost * i.cos * kInvPi);
+    e.pdf += o.base * i.cos * kInvPi;
+    e.pdf_rev += i.base * o.cos * kInvPi;
     return e;
 }
 
@@ -169,16 +163,12 @@ BsdfEval OpenPbrLobe::eval_opaque(const End& o, const End& i) const {
         base = lerp(again, color * least * once + several * lo * li / (l + Rgb(1e-6f)),
                     separable * tint);
     }
-    const float p_o = facet_probability(o), p_i = facet_probability(i);
-    BsdfEval e{.f = base * (i.cos * kInvPi),
-               .pdf = (1 - p_o) * i.cos * kInvPi,
-               .pdf_rev = (1 - p_i) * o.cos * kInvPi};
-    float cos_m, quarter_D;
-    if (!has_facets() || has_smooth_facets() || !facet(o.w, i.w, cos_m, quarter_D)) return e;
-    const float sigma_o = facets().sigma(o.w), sigma_i = facets().sigma(i.w);
-    e.f += fresnel(cos_m) * (quarter_D * i.cos / (sigma_o * sigma_i));
-    e.pdf += p_o * quarter_D / sigma_o;
-    e.pdf_rev += p_i * quarter_D / sigma_i;
+    const float p_o = facet_probability(o, again), p_i = facet_probability(i, again);
+    BsdfEval e;
+    if (has_facets() && !has_smooth_facets()) e = eval_facets(o, i, p_o, p_i);
+    e.f += base * (i.cos * kInvPi);
+    e.pdf += (1 - p_o) * i.cos * kInvPi;
+    e.pdf_rev += (1 - p_i) * o.cos * kInvPi;
     return e;
 }
 
@@ -192,7 +182,7 @@ BsdfEval OpenPbrLobe::eval_glass(const End& o, const End& i, const BsdfEval& sin
     const float mean =
         table->mean(i.w.z > 0 ? OpenPbrTable::kBase : OpenPbrTable::kBaseBelow, mean_row());
     if (!(mean > 0)) return e;
-    const GlassShares s = shares();
+    const GlassShares s = table->shares(mean_row(), eta);
     const auto share = [&](bool above) {
         const float t = above ? s.above : s.below;
         return transmits ? t : 1 - t;
@@ -308,7 +298,7 @@ std::optional<BsdfSample> OpenPbrLobe::sample(Vec3 wo, float u_lobe, Vec2 u) con
     }
     if (u_lobe >= p) {
         u_lobe = (u_lobe - p) / (1 - p);
-        const GlassShares s = shares();
+        const GlassShares s = table->shares(mean_row(), eta);
         const bool transmits = u_lobe < (side > 0 ? s.above : s.below);
         const Vec3 wi = sample_cosine_hemisphere(u) * (transmits ? -side : side);
         if (wi.z == 0) return {};
@@ -481,7 +471,7 @@ public:
     bool may_be_smooth() const override {
         return !roughness_.is_constant() ||
                sqr(roughness_.eval_scalar(Vec2())) > Microfacet::kMinAlpha || may_be(coat_) ||
-               may_be(fuzz_) || !is_one(metalness_);
+               may_be(fuzz_) || !(is_one(metalness_) || is_one(transmission_));
     }
     Rgb mean_albedo() const override {
         const float metal = metalness_.mean().mean(),

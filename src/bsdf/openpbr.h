@@ -57,14 +57,14 @@ private:
 
     /// F at a facet: Schlick's with the factor at 82° for a metal, else that of a dielectric, tinted.
     Rgb fresnel(float cos_m) const;
-    /// Colour of light that metal facets reflect several times.
-    Rgb interreflected() const;
+    /// Colour of light that metal facets reflect several times, where one reflection loses this share on average.
+    Rgb interreflected(float lost) const;
     Rgb base_of_opaque(float interreflection) const { return lerp(interreflection, color, tint); }
     /// Colour of the light that the slab gives back beneath the layers.
     Rgb excess_color() const;
-    /// The shares of the slab's samples that go to the facets.
+    /// The share of the slab's samples that goes to the facets; `interreflection` is that of the table of an opaque slab.
+    float facet_probability(const End& e, float interreflection) const;
     float facet_probability(const End& e) const;
-    GlassShares shares() const;
 
     BsdfEval eval(const End& o, Vec3 wi) const;
     BsdfEval eval_slab(const End& o, const End& i) const;
@@ -72,8 +72,8 @@ private:
     BsdfEval eval_metal(const End& o, const End& i) const;
     BsdfEval eval_glass(const End& o, const End& i, const BsdfEval& single) const;
     RoughDielectricLobe glass() const { return {facets(), eta, tint, color}; }
-    /// D m-density of reflection; false where the directions have no facet.
-    bool facet(Vec3 wo, Vec3 wi, float& cos_m, float& quarter_D) const;
+    /// One reflection at rough facets, which are sampled with these probabilities.
+    BsdfEval eval_facets(const End& o, const End& i, float p_o, float p_i) const;
     /// Factor of the slab's light by the layers above.
     Rgb passed(const End& o, const End& i) const;
     BsdfEval covered(const BsdfEval& slab, const End& o, const End& i) const;

@@ -156,7 +156,7 @@ OpenPbrTable::OpenPbrTable(OpenPbrSlab slab, const OpenPbrConstants& constants)
     const auto rows = size_t(n_alpha_ * n_eta_);
     for (auto& v : values_) v.resize(rows * size_t(n_phi_) * CosineNodes::kNodes);
     for (auto& m : means_) m.resize(rows);
-    interreflection_.resize(rows);
+    for (auto* v : {&interreflection_, &transmitted_above_, &transmitted_below_}) v->resize(rows);
     for (int j = 0; j < CosineNodes::kNodes; ++j) {
         const float cos_o = CosineNodes::cosine(j);
         lost_by_diffuse_[size_t(j)] =
@@ -286,7 +286,8 @@ void OpenPbrTable::make_glass(const Facets& facets, const Layer& layer, Plane ab
             const float eta_io = side == 0 ? facets.eta : 1 / facets.eta;
             double all = 0, sum = 0;
             for_normals(
-                kNormalsOfGlass, facets.alpha, wo, [&](Vec3 m, const auto& G1, double weight) {
+                n_eta_ > 1 ? kNormals : kNormalsOfGlass, facets.alpha, wo,
+                [&](Vec3 m, const auto& G1, double weight) {
                     const DielectricFresnel fresnel = fresnel_dielectric(dot(wo, m), eta_io);
                     if (const Vec3 wi = reflect(wo, m); wi.z > 0) {
                         const double part = weight * double(fresnel.R * G1(wi));
@@ -304,7 +305,12 @@ void OpenPbrTable::make_glass(const Facets& facets, const Layer& layer, Plane ab
             taken[size_t(side)][size_t(j)] = float(sum);
         }
     const double mean_above = facets.mean(lost[0]), mean_below = facets.mean(lost[1]);
-    const GlassShares shares = glass_shares(facets.eta, float(mean_above), float(mean_below));
+    const GlassShares transmitted{1 - fresnel_diffuse_reflectance(facets.eta),
+                                  1 - fresnel_diffuse_reflectance(1 / facets.eta)};
+    transmitted_above_[size_t(facets.row)] = transmitted.above;
+    transmitted_below_[size_t(facets.row)] = transmitted.below;
+    const GlassShares shares =
+        GlassShares::of(transmitted, facets.eta, float(mean_above), float(mean_below));
     for (int j = 0; j < facets.nodes(); ++j) {
         const auto o = size_t(j);
         // Of the light that is lost, a share is reflected and a share transmitted above.
@@ -321,15 +327,6 @@ void OpenPbrTable::make_glass(const Facets& facets, const Layer& layer, Plane ab
         plane(above, facets.row)[j] = std::max(0.0f, float(up));
         plane(below, facets.row)[j] = std::max(0.0f, float(down));
     }
-}
-
-GlassShares glass_shares(float eta, float mean_lost_above, float mean_lost_below) {
-    const float above = 1 - fresnel_diffuse_reflectance(eta),
-                below = 1 - fresnel_diffuse_reflectance(1 / eta);
-    const float from_above = mean_lost_above, from_below = sqr(eta) * mean_lost_below;
-    if (!(from_above > 0 && from_below > 0)) return {above, below};
-    const float share = std::min(above, below * from_below / from_above);
-    return {share, share * from_above / from_below};
 }
 
 std::shared_ptr<SharedOpenPbrTable> SharedOpenPbrTable::of(OpenPbrSlab slab,

@@ -49,13 +49,22 @@ struct CosineNodes {
 };
 
 /// Of the light that a rough dielectric boundary loses by single scattering, the shares that it transmits from above and
-/// from below; the rest is reflected. `eta` is η below over η above. They make the lobes adjoint to each other,
+/// from below; the rest is reflected. They make the lobes adjoint to each other,
 ///     above · lost_above = below · η² · lost_below,
 /// and come as near to the transmittances for diffuse light as this allows.
 struct GlassShares {
     float above, below;
+
+    /// Of transmittances for diffuse light, the η below over η above, and the mean losses.
+    static GlassShares of(GlassShares transmittance, float eta, float lost_above,
+                          float lost_below) {
+        const float from_below = sqr(eta) * lost_below;
+        if (!(lost_above > 0 && from_below > 0)) return transmittance;
+        const float share =
+            std::min(transmittance.above, transmittance.below * from_below / lost_above);
+        return {share, share * lost_above / from_below};
+    }
 };
-GlassShares glass_shares(float eta, float mean_lost_above, float mean_lost_below);
 
 /// What of a material does not vary over it, and so determines the tables.
 struct OpenPbrConstants {
@@ -201,6 +210,15 @@ public:
     float interreflection(Row r) const {
         return interpolate(r, 1, [&](int row) { return interreflection_[size_t(row)]; });
     }
+    /// Glass, for its roughness and index.
+    GlassShares shares(Row r, float eta) const {
+        const auto transmittance = [&](const std::vector<float>& v) {
+            return interpolate(r, 1, [&](int row) { return v[size_t(row)]; });
+        };
+        return GlassShares::of(
+            {transmittance(transmitted_above_), transmittance(transmitted_below_)}, eta,
+            mean(kBase, r), mean(kBaseBelow, r));
+    }
     /// 1 − the albedo of f_FON, which only depends on the diffuse roughness, and its mean.
     float lost_by_diffuse(CosineNodes::Place p) const {
         return CosineNodes::at(lost_by_diffuse_.data(), p);
@@ -241,7 +259,7 @@ private:
     OpenPbrLayers layers_;
     int n_alpha_, n_eta_, n_phi_;
     std::array<std::vector<float>, kPlanes> values_, means_;
-    std::vector<float> interreflection_;
+    std::vector<float> interreflection_, transmitted_above_, transmitted_below_;
     CosineNodes::Values lost_by_diffuse_{};
     float mean_lost_by_diffuse_ = 0;
 };
@@ -264,7 +282,7 @@ private:
     MadeOnce<OpenPbrTable> value_;
 };
 
-/// Diffuse reflection of V-shaped facets, white, once reflected, times π: f_FON of [Portsmouth et al. 2025, eq. 15], a
+/// Diffuse reflection of V-shaped facets, white, once reflected, times π: f_FON of [Portsmouth et al. 2025], a
 /// form of [Fujii 2012]. `together` is sin θo sin θi cos(φo − φi).
 inline float fon(float roughness, float cos_o, float cos_i, float together) {
     const float A = 1 / (1 + (0.5f - 2 * kInvPi / 3) * roughness);
