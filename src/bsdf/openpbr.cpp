@@ -27,6 +27,8 @@
 //   - The coat does not darken its base by reflections between them, and there is no subsurface scattering, dispersion, thin
 //     film or emission.
 // A material with transmission has its opaque part on both sides; other ones reflect on the front alone.
+// The albedo of white surfaces is 1 within 0.5 %, for roughnesses from 0 to 1; of those with both coat and fuzz it is 0.985
+// to 1.006, since the fuzz is taken to lie on the slab alone.
 
 #include "bsdf/openpbr.h"
 

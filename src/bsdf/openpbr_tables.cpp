@@ -7,7 +7,7 @@ namespace etendue {
 namespace {
 
 /// Rows where α varies alone, and where η varies, too.
-constexpr int kAlphaRowsOfSlab = 25, kAlphaRowsBesideEta = 17, kEtaRowsOfSlab = 13, kPhiRows = 9;
+constexpr int kAlphaRowsOfSlab = 25, kAlphaRowsBesideEta = 17, kEtaRowsOfSlab = 17, kPhiRows = 9;
 /// The squares are the numbers of normals per node. Those of glass decide on total reflection as well.
 constexpr int kNormals = 32, kNormalsOfGlass = 48;
 constexpr float kLargestEpsilon = 0.999f;

@@ -135,7 +135,7 @@ TEST(OpenPbr, SmoothPartsAreDeltaEvents) {
 /// ∫ f of the smooth part and of the delta events; of sharp lobes beside wide ones the mean of samples.
 double albedo(const OpenPbrLobe& lobe, Vec3 wo, int channel = 1) {
     if (lobe.has_smooth() && lobe.roughness() < 0.03f && lobe.slab != OpenPbrSlab::Glass)
-        return double(sampled_albedo(lobe, wo, 128).value[channel]);
+        return double(sampled_albedo(lobe, wo, 512).value[channel]);
     double sum = lobe.has_smooth() ? integrated_albedo(lobe, wo, channel) : 0;
     for (const bool transmits : {false, true})
         if (const auto s = lobe.delta_event(wo, transmits))
@@ -194,21 +194,25 @@ TEST(OpenPbr, AnisotropicMetalIsClosed) {
 
 // Textures make a table of rows, between which the albedo is interpolated.
 TEST(OpenPbr, TexturedRoughnessAndReflectanceAreClosed) {
-    for (const Values& slab : {kMetal, Values{}, kGlass})
-        for (const float r : {0.05f, 0.33f, 0.71f, 0.98f})
-            for (const float weight : {0.2f, 0.6f, 3.0f}) {
-                Made made(kWhite + slab, [&](TestMaterials& m) {
-                    FunctionTexture roughness, specular;
-                    roughness.color = [=](Vec2) { return Rgb(r); };
-                    specular.color = [=](Vec2) { return Rgb(weight); };
-                    return Children{{"specular_roughness", m.texture(roughness)},
-                                    {"specular_weight", m.texture(specular)}};
-                });
+    for (const Values& slab : {kMetal, Values{}, kGlass}) {
+        float r = 0, weight = 0;
+        Made made(kWhite + slab, [&](TestMaterials& m) {
+            FunctionTexture roughness, specular;
+            roughness.color = [&](Vec2) { return Rgb(r); };
+            specular.color = [&](Vec2) { return Rgb(weight); };
+            return Children{{"specular_roughness", m.texture(roughness)},
+                            {"specular_weight", m.texture(specular)}};
+        });
+        for (const float rough_value : {0.05f, 0.33f, 0.71f, 0.98f})
+            for (const float weight_value : {0.2f, 0.6f, 3.0f}) {
+                r = rough_value;
+                weight = weight_value;
                 const OpenPbrLobe lobe = made.lobe();
                 for (const float cos : {1.0f, 0.6f, 0.2f, 0.1f})
                     EXPECT_NEAR(albedo(lobe, {std::sqrt(1 - sqr(cos)), 0, cos}), 1, 0.005)
                         << "roughness " << r << ", weight " << weight << ", cosine " << cos;
             }
+    }
 }
 
 // Light that is in the ball meets the opaque half from behind.
