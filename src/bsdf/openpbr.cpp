@@ -190,7 +190,13 @@ BsdfEval OpenPbrLobe::eval_glass(const End& o, const End& i, const BsdfEval& sin
         return transmits ? t : 1 - t;
     };
     const float share_o = share(is_above), share_i = share(i.w.z > 0);
-    e.f += (transmits ? color : tint) * (share_o * o.base * i.base / mean * i.cos * kInvPi);
+    // Each further facet tints the light with the mean of the two colours.
+    const Rgb tinted = 0.5f * (color + tint);
+    const float lost = 0.5f * (table->mean(OpenPbrTable::kBase, mean_row()) +
+                               table->mean(OpenPbrTable::kBaseBelow, mean_row()));
+    const Rgb several = tinted * (1 - lost) / (Rgb(1) - tinted * lost);
+    e.f +=
+        (transmits ? color : tint) * several * (share_o * o.base * i.base / mean * i.cos * kInvPi);
     e.pdf += o.base * share_o * i.cos * kInvPi;
     e.pdf_rev += i.base * share_i * o.cos * kInvPi;
     return e;
