@@ -10,14 +10,18 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 BUSY = 0.5  # Load from which on times vary.
 
 
+def commit():
+    """Of this tree; of the tree before the first measurement where several write into it, as scripts/results does."""
+    describe = ["git", "-C", str(ROOT), "describe", "--always", "--dirty"]
+    return os.environ.get("ETENDUE_COMMIT") or subprocess.run(describe, capture_output=True, text=True).stdout.strip() or "unknown"
+
+
 def described(program):
     """To be called before the measurement, which itself is a load."""
-    describe = ["git", "-C", str(ROOT), "describe", "--always", "--dirty"]
-    commit = subprocess.run(describe, capture_output=True, text=True).stdout.strip()
     names = [line.split(":", 1)[1].strip() for line in pathlib.Path("/proc/cpuinfo").read_text().splitlines()
              if line.startswith("model name")]
     version = subprocess.run([str(program), "--version"], capture_output=True, text=True, check=True).stdout.strip()
-    return {"date": time.strftime("%Y-%m-%d", time.gmtime()), "commit": commit or "unknown", "program": version,
+    return {"date": time.strftime("%Y-%m-%d", time.gmtime()), "commit": commit(), "program": version,
             "processor": names[0] if names else "unknown", "cores": len(os.sched_getaffinity(0)),
             "load": round(os.getloadavg()[0], 2)}
 

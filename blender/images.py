@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import struct
+import tempfile
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,22 +25,54 @@ def plain_name(name: str) -> str:
 
 
 def with_copies(description: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """The description with copies of its image files in the folder textures of another one, to which their names are relative."""
-    copies: dict[str, str] = {}
+    """The description with copies of its image files in the folder textures of another one, to which their names are relative.
+    Files that are there already stay as they are, and copies appear when all of them are complete."""
+    textures = folder / "textures"
+    sources = list(dict.fromkeys(_file_names(description)))
+    originals = {Path(name).resolve() for name in sources}
+    names: dict[str, str] = {}
+    copies: list[tuple[str, Path]] = []
+    number = 0
+    for name in sources:
+        original = Path(name).resolve()
+        if original.parent == textures.resolve():
+            names[name] = f"textures/{original.name}"
+            continue
+        while (copy := textures / f"{number}-{Path(name).name}").resolve() in originals:
+            number += 1
+        number += 1
+        names[name] = f"textures/{copy.name}"
+        copies.append((name, copy))
+    _copy(copies, textures)
+    renamed: dict[str, Any] = _with_names(description, names)
+    return renamed
 
-    def copied(name: str) -> str:
-        if name not in copies:
-            copies[name] = f"textures/{len(copies)}-{Path(name).name}"
-            (folder / "textures").mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(name, folder / copies[name])
-        return copies[name]
 
-    def visit(value: Any) -> Any:
-        if not isinstance(value, dict):
-            return value
-        return {k: copied(v) if k == "filename" else visit(v) for k, v in value.items()}
+def _file_names(value: Any) -> Iterator[str]:
+    """The names of image files in a description."""
+    for key, inner in value.items() if isinstance(value, dict) else ():
+        if key == "filename":
+            yield inner
+        else:
+            yield from _file_names(inner)
 
-    return visit(description)
+
+def _with_names(value: Any, names: dict[str, str]) -> Any:
+    if not isinstance(value, dict):
+        return value
+    return {k: names[v] if k == "filename" else _with_names(v, names) for k, v in value.items()}
+
+
+def _copy(copies: list[tuple[str, Path]], folder: Path) -> None:
+    """Copies all files or, where one cannot be read or written, none."""
+    if not copies:
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".etendue-", suffix=".part", dir=folder) as parts:
+        for name, copy in copies:
+            shutil.copyfile(name, Path(parts) / copy.name)
+        for _, copy in copies:
+            os.replace(Path(parts) / copy.name, copy)
 
 
 class ImageFiles:

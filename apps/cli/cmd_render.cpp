@@ -474,8 +474,7 @@ std::unique_ptr<RenderCommand::Job> RenderCommand::make_job(const Ranks& ranks) 
                     (1 << 20));
     job->renderer = make_renderer(s, job->settings);
     Renderer& renderer = *job->renderer;
-    print_warnings(memory_warnings(s, job->settings.integrator.name, renderer.integrator(),
-                                   renderer.light_paths(), available_memory()));
+    print_warnings(memory_warnings(renderer));
     if (is_first) check_outputs();
     if (needs_conditions)
         job->conditions = conditions_of(renderer, s, {fingerprint, scene.lenient, scene.watertight},

@@ -145,15 +145,16 @@ void print_classes(const VerifyReport& report, const MethodReport& m) {
 }
 
 /// A table with one row per path length and one column per number s of light vertices; `pairs` selects merges and
-/// gathers, or all other techniques.
+/// gathers, or specular connections, which no method has together; or all other techniques.
 void print_techniques(const VerifyReport& report, const MethodReport& m, bool pairs) {
     std::map<int, std::vector<const TechniqueReport*>> rows;
     for (const TechniqueReport& t : m.techniques)
-        if (is_pair(t.technique.strategy) == pairs) rows[t.technique.vertices() - 1].push_back(&t);
+        if (has_own_light_side(t.technique.strategy) == pairs)
+            rows[t.technique.vertices() - 1].push_back(&t);
     if (rows.empty()) return;
     fmt::print("  {} alone, ratio to the reference (standard error of the last digits; share "
                "compared), by s\n",
-               pairs ? "pairs of vertices" : "connections");
+               pairs ? "pairs of vertices, or specular connections," : "connections");
     for (const auto& [edges, row] : rows) {
         std::string line = fmt::format("  {:>6} ", edges);
         int column = 0;
@@ -172,7 +173,7 @@ void print_techniques(const VerifyReport& report, const MethodReport& m, bool pa
         fmt::print("{}\n", line);
     }
     for (const TechniqueReport& t : m.techniques)
-        if (is_pair(t.technique.strategy) == pairs && report.deviates(t.comparison))
+        if (has_own_light_side(t.technique.strategy) == pairs && report.deviates(t.comparison))
             fmt::print("  s = {}, t = {}: {}\n", t.technique.s, t.technique.t,
                        describe(report, t.comparison));
 }

@@ -17,7 +17,10 @@ void write_techniques(const TechniqueImages& images, const FilmGeometry& film,
         const bool is_stored = t.technique.strategy == Strategy::Connect && t.technique.s == 1;
         const std::string stem =
             fmt::format("{}/length{:02}_s{:02}_t{:02}{}", folder, t.technique.vertices() - 1,
-                        t.technique.s, t.technique.t, is_stored ? "_stored" : "");
+                        t.technique.s, t.technique.t,
+                        is_stored                                    ? "_stored"
+                        : t.technique.strategy == Strategy::Specular ? "_specular"
+                                                                     : "");
         write_image(stem + "_weighted.exr",
                     rgb_image(film.crop_width, film.crop_height, t.weighted));
         write_image(stem + "_unweighted.exr",

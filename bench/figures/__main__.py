@@ -54,6 +54,7 @@ def parse_arguments():
     parser.add_argument("--etendue", default=str(ROOT / "build/release/etendue"), help="the program")
     parser.add_argument("--out", type=pathlib.Path, default=ROOT / "docs/figures",
                         help="output folder (default: docs/figures)")
+    parser.add_argument("--references", type=pathlib.Path, metavar="FOLDER", help="where references are kept for later calls")
     parser.add_argument("--threads", type=int, default=os.cpu_count())
     parser.add_argument("--scale", type=float, default=1, help="factor on all times")
     parser.add_argument("--quick", action="store_true",
@@ -77,7 +78,7 @@ def main():
     arguments = parse_arguments()
     failed = False
     with tempfile.TemporaryDirectory() as folder:
-        runs = Runs(arguments.etendue, arguments.threads, arguments.scale, folder)
+        runs = Runs(arguments.etendue, arguments.threads, arguments.scale, folder, arguments.references)
         for name in arguments.names:
             make, seconds = FIGURES[name]
             begin = time.monotonic()

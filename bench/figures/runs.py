@@ -9,6 +9,9 @@ import sys
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "bench"))
+import machine  # noqa: E402
+
 SHARED = pathlib.Path(os.environ.get("ETENDUE_SCENES", ROOT.parent / "shared" / "scenes"))
 
 # File, in scenes/ of the project or in the folder of shared scenes, and size of its images.
@@ -40,15 +43,14 @@ class Skipped(Exception):
 class Runs:
     """Program, threads and scale of times for all figures."""
 
-    def __init__(self, program, threads, scale, folder):
+    def __init__(self, program, threads, scale, folder, references=None):
         self.program = program
         self.threads = threads
         self.scale = scale
         self.folder = pathlib.Path(folder)
+        self.references = references or self.folder / "references"
 
     def description(self):
-        describe = ["git", "-C", str(ROOT), "describe", "--always", "--dirty"]
-        commit = subprocess.run(describe, capture_output=True, text=True).stdout.strip()
         processor = [
             line.split(":", 1)[1].strip()
             for line in pathlib.Path("/proc/cpuinfo").read_text().splitlines()
@@ -56,7 +58,7 @@ class Runs:
         ]
         return {
             "program": self._call("--version").strip(),
-            "commit": commit or "unknown",
+            "commit": machine.commit(),
             "processor": processor[0] if processor else "unknown",
             "threads": self.threads,
             "time_scale": self.scale,
@@ -104,7 +106,7 @@ class Runs:
         arguments += ["--resolution", "{}x{}".format(*(size or SCENES[scene][1]))]
         arguments += ["--paths", paths, "--lengths", lengths, "--techniques-max-depth", 0]
         arguments += ["--reference-time", self.scale * reference_seconds]
-        arguments += ["--reference-method", reference_method, "--references", self.folder / "references"]
+        arguments += ["--reference-method", reference_method, "--references", self.references]
         arguments += ["--report", report, "--seed", FIRST_SEED, "--threads", self.threads]
         self._call(*arguments, "--quiet")
         return _comparison(json.loads((report / "report.json").read_text()), scene)

@@ -480,7 +480,7 @@ def resume(
         raise ValueError(f"{fspath(file)}: expected integrator, an object like the {of['integrator']} that it was rendered by")
     rendering = _etendue.Rendering(
         built(scene, threads), of["integrator"] if integrator is None else integrator, spp, time, error, of["seed"],
-        of["sampler"], of["filter_mode"], threads, of["technique_depth"], of["first_pass"],
+        of["sampler"], of["filter_mode"], threads, of["technique_depth"], of["first_pass"], of["choice"],
     )
     rendering.resume(fspath(file))
     return run(rendering, aovs, callback, progress, live)
@@ -525,6 +525,8 @@ def run(
     seconds_between: float = 0.0,
 ) -> Result:
     """Renders all passes. The callback is called between them, if the last call was at least seconds_between before."""
+    for text in rendering.memory_warnings:
+        warnings.warn(text, stacklevel=3)
     update_view: Callable[..., None] | None = None
     if live:
         from ._show import LiveView

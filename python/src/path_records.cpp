@@ -44,7 +44,8 @@ public:
                            {join.film.x, join.film.y}});
         std::vector<Vec3> x;
         for (int i = 0; i < q.s; ++i)
-            x.push_back(i == 0 && q.strategy == Strategy::NextEvent ? join.b.p : work.y[i].p);
+            x.push_back(i == 0 && q.strategy == Strategy::NextEvent ? join.b.p
+                                                                    : work.light_side(q)[i].p);
         for (int i = q.t - 1; i >= 0; --i)
             x.push_back(i == 0 && q.strategy == Strategy::Splat ? lens_end(scene_, join).p
                                                                 : work.z[i].p);

@@ -21,6 +21,7 @@
 #include "bindings.h"
 #include "image/denoiser.h"
 #include "image/image_io.h"
+#include "integrator/auto.h"
 #include "math/statistics.h"
 #include "render/aov.h"
 #include "render/merging.h"
@@ -56,11 +57,31 @@ std::string python_identity(nb::handle integrator) {
         nb::module_::import_("etendue._integrator").attr("identity")(integrator));
 }
 
-/// The pilots of `auto` take time.
-RenderSettings with_method(const Scene& scene, const RenderSettings& settings) {
+/// The pilots of `auto` take time, and Ctrl-C ends them. `earlier`: the choice of the rendering that goes on, or empty.
+RenderSettings with_method(const Scene& scene, const RenderSettings& settings,
+                           const std::string& earlier) {
+    if (!earlier.empty()) {
+        const MethodChoice choice = MethodChoice::from_json(earlier);
+        RenderSettings chosen = with_chosen_method(settings, choice);
+        if (chosen.integrator.to_string() == choice.chosen)
+            chosen.choice = std::make_shared<const MethodChoice>(choice);
+        return chosen;
+    }
+    if (!is_auto(settings.integrator)) return settings;
     use_threads();
-    const nb::gil_scoped_release no_gil;
-    return with_chosen_method(scene, settings);
+    RenderSettings chosen;
+    Background background;
+    try {
+        background.run([&] { chosen = with_chosen_method(scene, settings, background.drop); },
+                       [] {});
+    } catch (const PassDropped&) {
+        // What interrupted them follows.
+    }
+    if (background.interrupted) {
+        PyErr_SetNone(PyExc_KeyboardInterrupt);
+        throw nb::python_error();
+    }
+    return chosen;
 }
 
 /// Trial renderings of the integrator take time.
@@ -87,9 +108,12 @@ std::vector<Rgb> half_width_of(const Film& film) {
 /// A renderer with its scene.
 class Rendering {
 public:
-    Rendering(ScenePtr scene, nb::handle integrator, const RenderRequest& request)
+    /// `earlier`: as in with_method().
+    Rendering(ScenePtr scene, nb::handle integrator, const RenderRequest& request,
+              const std::string& earlier)
         : scene_(std::move(scene)),
-          settings_(with_method(scene_->scene, settings_for(scene_->scene, integrator, request))),
+          settings_(with_method(scene_->scene, settings_for(scene_->scene, integrator, request),
+                                earlier)),
           python_integrator_(settings_.integrator.make ? python_identity(integrator) : ""),
           renderer_(make_renderer(scene_->scene, settings_)), conditions_(conditions()) {}
 
@@ -231,9 +255,6 @@ public:
         use_threads();
         CheckpointFile checkpoint(file);
         checkpoint.resume(renderer_, conditions_, log_);
-        if (const std::string& choice = checkpoint.header().choice; !choice.empty())
-            settings_.choice =
-                std::make_shared<const MethodChoice>(MethodChoice::from_json(choice));
         const std::scoped_lock lock(mutex_);
         now_ = Now{renderer_.film().passes(), renderer_.seconds(), {}, 0, {}};
     }
@@ -508,6 +529,7 @@ void bind_merging(nb::module_& m) {
             d["seed"] = range.seed;
             d["first_pass"] = range.first;
             d["technique_depth"] = c.technique_depth;
+            d["choice"] = c.choice;
             return d;
         },
         "file"_a);
@@ -526,7 +548,7 @@ void bind_render(nb::module_& m) {
             [](Rendering* self, ScenePtr scene, nb::handle integrator, std::optional<uint64_t> spp,
                std::optional<double> time, std::optional<double> error, uint64_t seed,
                const std::string& sampler, const std::string& filter, int threads,
-               int technique_depth, uint64_t first_pass) {
+               int technique_depth, uint64_t first_pass, const std::string& choice) {
                 RenderRequest r;
                 r.spp = spp;
                 r.seconds = time;
@@ -537,10 +559,11 @@ void bind_render(nb::module_& m) {
                 r.threads = threads;
                 r.technique_depth = technique_depth;
                 r.first_pass = first_pass;
-                new (self) Rendering(std::move(scene), integrator, r);
+                new (self) Rendering(std::move(scene), integrator, r, choice);
             },
             "scene"_a, "integrator"_a, "spp"_a.none(), "time"_a.none(), "error"_a.none(), "seed"_a,
-            "sampler"_a, "filter_mode"_a, "threads"_a, "technique_depth"_a, "first_pass"_a)
+            "sampler"_a, "filter_mode"_a, "threads"_a, "technique_depth"_a, "first_pass"_a,
+            "choice"_a = "")
         .def("run", &Rendering::run, "tick"_a.none(), "callback"_a.none(), "interval"_a)
         .def("stop", &Rendering::stop)
         .def("now", &Rendering::now)
@@ -556,6 +579,8 @@ void bind_render(nb::module_& m) {
         .def_prop_ro("integrator",
                      [](const Rendering& r) { return r.settings().integrator.to_string(); })
         .def_prop_ro("warnings", [](const Rendering& r) { return warnings(r.renderer().stats()); })
+        .def_prop_ro("memory_warnings",
+                     [](const Rendering& r) { return memory_warnings(r.renderer()); })
         .def("error",
              [](const Rendering& r) {
                  const nb::gil_scoped_release no_gil;

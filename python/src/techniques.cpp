@@ -15,15 +15,15 @@ constexpr std::pair<const char*, Strategy> kStrategies[] = {
     {"hit", Strategy::Hit},          {"next_event", Strategy::NextEvent},
     {"connect", Strategy::Connect},  {"splat", Strategy::Splat},
     {"hit_lens", Strategy::HitLens}, {"merge", Strategy::Merge},
-    {"gather", Strategy::Gather}};
+    {"gather", Strategy::Gather},    {"specular", Strategy::Specular}};
 
 Technique make_technique(int s, int t, const std::optional<std::string>& strategy, bool drops_eye) {
     if (s < 0 || t < 0 || s + t < 2) throw nb::value_error("s and t count the vertices of a path");
     if (!strategy) return connection_technique(s, t);
     for (const auto& [name, value] : kStrategies)
         if (*strategy == name) return {value, s, t, drops_eye};
-    throw nb::value_error("strategy must be hit, next_event, connect, splat, hit_lens, merge or "
-                          "gather");
+    throw nb::value_error("strategy must be hit, next_event, connect, splat, hit_lens, merge, "
+                          "gather or specular");
 }
 
 template <class T>
@@ -104,7 +104,7 @@ void bind_techniques(nb::module_& m) {
         .def_ro("t", &Technique::t, "Number of vertices of the eye path.")
         .def_prop_ro(
             "strategy", [](const Technique& q) { return std::string(name_of(q.strategy)); },
-            "The name: hit, next_event, connect, splat, hit_lens, merge or gather.")
+            "The name: hit, next_event, connect, splat, hit_lens, merge, gather or specular.")
         .def_prop_ro(
             "edges", [](const Technique& q) { return q.vertices() - 1; },
             "Number of edges of the whole path.")

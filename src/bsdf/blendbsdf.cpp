@@ -43,6 +43,9 @@ public:
     bool may_be_smooth() const override {
         return nested_[0]->may_be_smooth() || nested_[1]->may_be_smooth();
     }
+    bool perturbs_normals() const override {
+        return nested_[0]->perturbs_normals() || nested_[1]->perturbs_normals();
+    }
     Rgb mean_albedo() const override {
         return lerp(clamp(luminance(weight_.mean()), 0, 1), nested_[0]->mean_albedo(),
                     nested_[1]->mean_albedo());

@@ -28,6 +28,7 @@ public:
                 ComponentList& list) const override {
         nested_->append(point, bumped(point, frame), weight, list);
     }
+    bool perturbs_normals() const override { return true; }
 
 private:
     Frame bumped(const SurfacePoint& point, const Frame& frame) const {

@@ -42,6 +42,9 @@ public:
     bool may_be_smooth() const override {
         return any([](const Material& m) { return m.may_be_smooth(); });
     }
+    bool perturbs_normals() const override {
+        return any([](const Material& m) { return m.perturbs_normals(); });
+    }
     Rgb mean_albedo() const override {
         Rgb sum;
         for (size_t i = 0; i < nested_.size(); ++i) sum += nested_[i]->mean_albedo() * weights_[i];

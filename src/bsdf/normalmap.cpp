@@ -29,6 +29,7 @@ public:
             frame.to_world({(2 * c.r - 1) * scale_, (2 * c.g - 1) * scale_ * t_sign, 2 * c.b - 1});
         nested_->append(point, perturbed_frame(point, frame, n), weight, list);
     }
+    bool perturbs_normals() const override { return true; }
 
 private:
     TextureRef normals_;

@@ -34,6 +34,9 @@ public:
     bool needs_tangents() const override {
         return front_->needs_tangents() || back_->needs_tangents();
     }
+    bool perturbs_normals() const override {
+        return front_->perturbs_normals() || back_->perturbs_normals();
+    }
     Rgb mean_albedo() const override {
         return (front_->mean_albedo() + back_->mean_albedo()) * 0.5f;
     }

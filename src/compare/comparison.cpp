@@ -14,6 +14,7 @@
 #include "image/radiance_file.h"
 #include "integrator/auto.h"
 #include "math/statistics.h"
+#include "render/method_choice.h"
 #include "render/warnings.h"
 #include "system/failure.h"
 
@@ -125,6 +126,10 @@ void render_in_turns(std::vector<MethodRun>& method_runs, const CompareSettings&
 void render_techniques(const Scene& scene, const CompareSettings& settings, Method& method,
                        const std::atomic<bool>& interrupted) {
     RenderSettings s = render_settings(settings, method.spec.integrator, settings.seed);
+    if (method.choice) {
+        s = with_chosen_method(s, *method.choice);
+        s.choice = nullptr;  // The time of its pilots is not that of these images.
+    }
     s.technique_depth = settings.technique_depth;
     s.seconds = method.runs.front().seconds / 4;
     Renderer renderer(scene, s);
@@ -200,7 +205,9 @@ double error_of_mean(const Method& m) {
 std::vector<std::string> Method::warnings() const {
     RenderStats all;
     for (const Run& r : runs) all += r.stats;
-    return etendue::warnings(all);
+    std::vector<std::string> texts = etendue::warnings(all);
+    texts.insert(texts.end(), memory_warnings.begin(), memory_warnings.end());
+    return texts;
 }
 
 void check_methods(const std::vector<MethodSpec>& methods) {
@@ -299,6 +306,10 @@ Comparison compare(const Scene& scene, const Reference& reference, const Compare
             c.attempt([&] {
                 c.renderer = std::make_unique<Renderer>(
                     scene, render_settings(settings, settings.methods[i].integrator, seed));
+                if (index > 0) return;
+                out.methods[i].memory_warnings = memory_warnings(*c.renderer);
+                for (const std::string& w : out.methods[i].memory_warnings)
+                    progress(fmt::format("{}: {}", out.methods[i].name(), w));
             });
             c.memory.end();
         }
@@ -317,6 +328,7 @@ Comparison compare(const Scene& scene, const Reference& reference, const Compare
             m.runs.push_back(finished_run(c, seed, reference));
             if (m.runs.size() > 1) continue;
             m.estimator = c.renderer->integrator().estimator();
+            m.choice = c.renderer->settings().choice;
             m.image = c.renderer->film().image();
             m.peak_bytes = c.memory.peak_bytes();
         }

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -58,15 +59,17 @@ struct Method {
     Estimator estimator = Estimator::Unbiased;
     std::vector<Run> runs;
     // Of the first of them:
+    std::shared_ptr<const MethodChoice> choice;  ///< Where `auto` has chosen.
     std::vector<Rgb> image;
     std::vector<float> flip_map;
     double flip = 0;
-    size_t peak_bytes = 0;  ///< See MemoryMeter.
+    size_t peak_bytes = 0;                     ///< See MemoryMeter.
+    std::vector<std::string> memory_warnings;  ///< See render/warnings.h.
     std::vector<TechniqueImages::Entry> techniques;
     uint64_t technique_spp = 0;
 
     const std::string& name() const { return spec.name; }
-    /// See render/warnings.h; of all runs.
+    /// See render/warnings.h; of all runs, and of the memory that they need.
     std::vector<std::string> warnings() const;
 };
 

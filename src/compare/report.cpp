@@ -137,6 +137,7 @@ std::vector<Rgb> false_colours(const std::vector<float>& values) {
 const char* kind_name(const Technique& q) {
     return q.strategy == Strategy::Merge                 ? "merge"
            : q.strategy == Strategy::Gather              ? "gather"
+           : q.strategy == Strategy::Specular            ? "specular"
            : q.strategy == Strategy::Connect && q.s == 1 ? "stored"
                                                          : "";
 }

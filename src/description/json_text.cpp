@@ -69,6 +69,11 @@ json parse_json(std::string_view text, const std::string& file) {
     }
 }
 
+std::string as_utf8(const std::string& text) {
+    return json::parse(json(text).dump(-1, ' ', false, json::error_handler_t::replace))
+        .get<std::string>();
+}
+
 std::string excerpt(const json& value) {
     constexpr size_t kMost = 60;
     std::string text = value.dump(-1, ' ', true, json::error_handler_t::replace);

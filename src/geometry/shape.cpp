@@ -101,6 +101,26 @@ double TriangleMesh::area() const {
 
 namespace {
 
+/// The root of a t² - 2 b t + c = 0 that is nearest to `near`; empty where there is none.
+std::optional<double> nearest_root(double a, double b, double c, double near) {
+    const double disc = b * b - a * c;
+    if (!(a > 0 && disc >= 0)) return {};
+    const double root = std::sqrt(disc), q = b < 0 ? b - root : b + root;
+    const double t0 = q / a, t1 = q != 0 ? c / q : t0;
+    return std::fabs(t0 - near) < std::fabs(t1 - near) ? t0 : t1;
+}
+
+/// A vector under the upper 3×3 part of `m`.
+Vec3d transformed(const Transform::Matrix& m, Vec3d v) {
+    return {m[0][0] * v.x + m[0][1] * v.y + m[0][2] * v.z,
+            m[1][0] * v.x + m[1][1] * v.y + m[1][2] * v.z,
+            m[2][0] * v.x + m[2][1] * v.y + m[2][2] * v.z};
+}
+/// Column `i` of `m`.
+Vec3d column(const Transform::Matrix& m, size_t i) {
+    return {m[0][i], m[1][i], m[2][i]};
+}
+
 /// A ray in the space of a shape.
 struct LocalRay {
     double o[3], d[3];
@@ -113,6 +133,21 @@ LocalRay local_ray(const Transform& to_local, Vec3 o, Vec3 d) {
         r.d[i] = m[i][0] * d.x + m[i][1] * d.y + m[i][2] * d.z;
     }
     return r;
+}
+
+/// The origin of the world in a shape's own coordinates.
+std::array<double, 3> origin_in(const Transform& to_local) {
+    const Transform::Matrix& m = to_local.matrix();
+    return {m[0][3], m[1][3], m[2][3]};
+}
+
+/// The image of a point under an affine transform, rounded once.
+Vec3 rounded_point(const Transform& to_world, const std::array<double, 3>& p) {
+    const Transform::Matrix& m = to_world.matrix();
+    const auto component = [&](size_t i) {
+        return float(m[i][0] * p[0] + m[i][1] * p[1] + m[i][2] * p[2] + m[i][3]);
+    };
+    return {component(0), component(1), component(2)};
 }
 
 /// a + u (b - a) + v (c - a), rounded once.
@@ -167,6 +202,33 @@ SurfaceGeometry TriangleMesh::surface(uint32_t prim, float u, float v, bool tang
         }
     }
     return g;
+}
+
+std::optional<SurfaceJet> TriangleMesh::jet(uint32_t prim, Vec3d o, Vec3d d, double) const {
+    const Face& face = faces_[prim];
+    const Vertex &a = vertices_[face.vertices[0]], &b = vertices_[face.vertices[1]],
+                 &c = vertices_[face.vertices[2]];
+    const Vec3d pa(a.p), e1 = Vec3d(b.p) - pa, e2 = Vec3d(c.p) - pa, n = cross(e1, e2);
+    const double slope = dot(d, n), n2 = dot(n, n);
+    if (slope == 0) return {};
+    const Vec3d p = o + d * (dot(pa - o, n) / slope);
+    SurfaceJet j{.p = p,
+                 .ng = n / std::sqrt(n2),
+                 .ns = {},
+                 .dpdu = e1,
+                 .dpdv = e2,
+                 .dnsdu = {},
+                 .dnsdv = {}};
+    j.ns = j.ng;
+    if (!has_normals_) return j;
+    const double u = dot(cross(p - pa, e2), n) / n2, v = dot(cross(e1, p - pa), n) / n2;
+    const Vec3d na(a.n), f1 = Vec3d(b.n) - na, f2 = Vec3d(c.n) - na, m = na + f1 * u + f2 * v;
+    const double size = length(m);
+    if (!(size > 0)) return j;
+    j.ns = m / size;
+    j.dnsdu = (f1 - j.ns * dot(j.ns, f1)) / size;
+    j.dnsdv = (f2 - j.ns * dot(j.ns, f2)) / size;
+    return j;
 }
 
 ShapeSample TriangleMesh::sample(uint32_t prim, Vec2 u) const {
@@ -269,6 +331,22 @@ SurfaceGeometry Sphere::surface(uint32_t, float u, float v, bool tangents) const
     return g;
 }
 
+std::optional<SurfaceJet> Sphere::jet(uint32_t, Vec3d o, Vec3d d, double near) const {
+    const Vec3d v = Vec3d(center_) - o;
+    const double r = double(radius_);
+    const auto t = nearest_root(dot(d, d), dot(v, d), dot(v, v) - r * r, near);
+    if (!t) return {};
+    const Vec3d n = (d * *t - v) / r;
+    const TangentBasis tangents(normalize(n));
+    return SurfaceJet{.p = o + d * *t,
+                      .ng = n,
+                      .ns = n,
+                      .dpdu = tangents.s * r,
+                      .dpdv = tangents.t * r,
+                      .dnsdu = tangents.s,
+                      .dnsdv = tangents.t};
+}
+
 ShapeSample Sphere::sample(uint32_t, Vec2 u) const {
     const Vec3 local = sample_uniform_sphere(u);
     const SurfaceGeometry g = at({local.x, local.y, local.z});
@@ -310,6 +388,9 @@ Disk::Disk(const Transform& to_world, bool flip_normals)
     : to_world_(to_world), to_local_(to_world.inverse()) {
     ng_ = normalize(to_world.normal({0, 0, 1}));
     if (flip_normals) ng_ = -ng_;
+    const std::array<double, 3> origin = origin_in(to_local_);
+    const double to_rim = 1 / std::max(1.0, std::hypot(origin[0], origin[1]));
+    near_ = {origin[0] * to_rim, origin[1] * to_rim};
 }
 
 Bounds3 Disk::bounds() const {
@@ -326,22 +407,39 @@ double Disk::area() const {
 }
 
 SurfaceGeometry Disk::surface(uint32_t, float u, float v, bool tangents) const {
-    float s, c;
-    sincosf(2 * kPi * v, &s, &c);
+    const double x = near_[0] + double(u), y = near_[1] + double(v);
+    const float radius = float(std::hypot(x, y));
+    const float c = radius > 0 ? float(x) / radius : 1, s = radius > 0 ? float(y) / radius : 0;
     SurfaceGeometry g;
-    g.p = to_world_.point({u * c, u * s, 0});
+    g.p = rounded_point(to_world_, {x, y, 0});
     g.ng = g.ns = ng_;
-    g.uv = {u, v};
+    g.uv = {std::min(radius, 1.0f), turns(c, s)};
     if (tangents) {
         g.dpdu = to_world_.vector({c, s, 0});
-        g.dpdv = to_world_.vector({-s, c, 0}) * (2 * kPi * u);
+        g.dpdv = to_world_.vector({-s, c, 0}) * (2 * kPi * radius);
     }
     return g;
 }
 
+std::optional<SurfaceJet> Disk::jet(uint32_t, Vec3d o, Vec3d d, double) const {
+    const Transform::Matrix& m = to_world_.matrix();
+    const Vec3d e1 = column(m, 0), e2 = column(m, 1), n = cross(e1, e2);
+    const double slope = dot(d, n);
+    if (slope == 0) return {};
+    const Vec3d unit = normalize(n);
+    return SurfaceJet{.p = o + d * (dot(column(m, 3) - o, n) / slope),
+                      .ng = unit,
+                      .ns = unit,
+                      .dpdu = e1,
+                      .dpdv = e2,
+                      .dnsdu = {},
+                      .dnsdv = {}};
+}
+
 ShapeSample Disk::sample(uint32_t, Vec2 u) const {
     const Vec2 d = sample_uniform_disk(u);
-    return {to_world_.point({d.x, d.y, 0}), ng_, {std::hypot(d.x, d.y), turns(d.x, d.y)}, 0};
+    const Vec2 at{float(d.x - near_[0]), float(d.y - near_[1])};
+    return {surface(0, at.x, at.y, false).p, ng_, at, 0};
 }
 
 bool Disk::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {
@@ -351,12 +449,18 @@ bool Disk::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {
     if (!(t > tmin && t < tmax)) return false;
     const double x = lo[0] + t * ld[0], y = lo[1] + t * ld[1];
     if (!(x * x + y * y <= 1)) return false;
-    hit = {t, {float(x), float(y), 0}};
+    hit = {t, {float(x - near_[0]), float(y - near_[1]), 0}};
     return true;
 }
 
 Vec2 Disk::parameters(Vec3 local) const {
-    return {std::min(std::hypot(local.x, local.y), 1.0f), turns(local.x, local.y)};
+    return {local.x, local.y};
+}
+
+Vec2 Disk::grid_parameters(Vec2 in_square) const {
+    double s, c;
+    sincos(2 * std::numbers::pi * in_square.y, &s, &c);
+    return {float(in_square.x * c - near_[0]), float(in_square.x * s - near_[1])};
 }
 
 // ---- Cylinder
@@ -365,6 +469,10 @@ Cylinder::Cylinder(const Transform& to_world, bool flip_normals)
     : to_world_(to_world), to_local_(to_world.inverse()), flip_(flip_normals) {
     radius_ = length(to_world.vector({1, 0, 0}));
     height_ = length(to_world.vector({0, 0, 1}));
+    const std::array<double, 3> origin = origin_in(to_local_);
+    const double distance = std::hypot(origin[0], origin[1]);
+    near_ = {1, 0, std::clamp(origin[2], 0.0, 1.0)};
+    if (distance > 0) near_[0] = origin[0] / distance, near_[1] = origin[1] / distance;
 }
 
 Bounds3 Cylinder::bounds() const {
@@ -384,31 +492,46 @@ double Cylinder::area() const {
 }
 
 SurfaceGeometry Cylinder::surface(uint32_t, float u, float v, bool tangents) const {
-    float s, c;
-    sincosf(2 * kPi * u, &s, &c);
+    double s, c;
+    sincos(2 * std::numbers::pi * u, &s, &c);
+    const double x = near_[0] * c - near_[1] * s, y = near_[1] * c + near_[0] * s,
+                 to_unit = 1 / std::sqrt(x * x + y * y), z = near_[2] + double(v);
     SurfaceGeometry g;
-    // In double, like the sphere.
-    const double unit = 1 / std::sqrt(double(c) * c + double(s) * s);
-    const double local[3] = {c * unit, s * unit, v};
-    float world[3];
-    for (int i = 0; i < 3; ++i) {
-        const auto& m = to_world_.matrix()[size_t(i)];
-        world[i] = float(m[0] * local[0] + m[1] * local[1] + m[2] * local[2] + m[3]);
-    }
-    g.p = {world[0], world[1], world[2]};
-    const Vec3 n = normalize(to_world_.normal({c, s, 0}));
+    g.p = rounded_point(to_world_, {x * to_unit, y * to_unit, z});
+    const float fx = float(x), fy = float(y);
+    const Vec3 n = normalize(to_world_.normal({fx, fy, 0}));
     g.ng = g.ns = flip_ ? -n : n;
-    g.uv = {u, v};
+    g.uv = {turns(fx, fy), float(z)};
     if (tangents) {
-        g.dpdu = to_world_.vector({-s, c, 0}) * (2 * kPi);
+        g.dpdu = to_world_.vector({-fy, fx, 0}) * (2 * kPi);
         g.dpdv = to_world_.vector({0, 0, 1});
     }
     return g;
 }
 
+std::optional<SurfaceJet> Cylinder::jet(uint32_t, Vec3d o, Vec3d d, double near) const {
+    const Transform::Matrix &m = to_world_.matrix(), &inv = to_local_.matrix();
+    const Vec3d lo = transformed(inv, o) + column(inv, 3), ld = transformed(inv, d);
+    const auto t = nearest_root(ld.x * ld.x + ld.y * ld.y, -(lo.x * ld.x + lo.y * ld.y),
+                                lo.x * lo.x + lo.y * lo.y - 1, near);
+    if (!t) return {};
+    const double x = lo.x + *t * ld.x, y = lo.y + *t * ld.y;
+    // The transform has no shear, and scales x and y alike.
+    const Vec3d n = column(m, 0) * x + column(m, 1) * y, dn = column(m, 1) * x - column(m, 0) * y;
+    const double size = length(n);
+    return SurfaceJet{.p = o + d * *t,
+                      .ng = n / size,
+                      .ns = n / size,
+                      .dpdu = dn,
+                      .dpdv = column(m, 2),
+                      .dnsdu = dn / size,
+                      .dnsdv = {}};
+}
+
 ShapeSample Cylinder::sample(uint32_t, Vec2 u) const {
-    const SurfaceGeometry g = surface(0, u.x, u.y, false);
-    return {g.p, g.ng, g.uv, 0};
+    const Vec2 at = grid_parameters(u);
+    const SurfaceGeometry g = surface(0, at.x, at.y, false);
+    return {g.p, g.ng, at, 0};
 }
 
 bool Cylinder::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {
@@ -425,14 +548,21 @@ bool Cylinder::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const
     for (double t : roots) {
         const double z = lo[2] + t * ld[2];
         if (!(t > tmin && t < tmax && z >= 0 && z <= 1)) continue;
-        hit = {t, {float(lo[0] + t * ld[0]), float(lo[1] + t * ld[1]), float(z)}};
+        const double x = lo[0] + t * ld[0], y = lo[1] + t * ld[1];
+        hit = {t,
+               {float(x * near_[0] + y * near_[1]), float(y * near_[0] - x * near_[1]),
+                float(z - near_[2])}};
         return true;
     }
     return false;
 }
 
 Vec2 Cylinder::parameters(Vec3 local) const {
-    return {turns(local.x, local.y), local.z};
+    return {std::atan2(local.y, local.x) / (2 * kPi), local.z};
+}
+
+Vec2 Cylinder::grid_parameters(Vec2 in_square) const {
+    return {in_square.x, float(in_square.y - near_[2])};
 }
 
 }  // namespace etendue

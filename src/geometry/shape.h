@@ -4,8 +4,10 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "geometry/surface_jet.h"
 #include "math/bounds.h"
 #include "math/prefetch.h"
 #include "math/transform.h"
@@ -46,6 +48,9 @@ public:
     virtual double primitive_area(uint32_t) const { return area(); }
     /// Geometry at parameters (u, v) of primitive `prim`, as in RayHit; dpdu and dpdv only if `tangents`.
     virtual SurfaceGeometry surface(uint32_t prim, float u, float v, bool tangents) const = 0;
+    /// Differential geometry where the line o + t·d meets `prim`, which extends beyond its edges: of several points the one
+    /// with t nearest to `near`. Empty where there is none.
+    virtual std::optional<SurfaceJet> jet(uint32_t prim, Vec3d o, Vec3d d, double near) const = 0;
     /// SurfaceGeometry::slack of the points of a primitive.
     virtual float slack(uint32_t) const { return 0; }
     /// Uniform in area on primitive `prim`.
@@ -91,6 +96,7 @@ public:
     double primitive_area(uint32_t prim) const override;
     /// (u, v) are the barycentric coordinates of the second and third vertex.
     SurfaceGeometry surface(uint32_t prim, float u, float v, bool tangents) const override;
+    std::optional<SurfaceJet> jet(uint32_t prim, Vec3d o, Vec3d d, double near) const override;
     float slack(uint32_t prim) const override { return faces_[prim].slack; }
     ShapeSample sample(uint32_t prim, Vec2 u) const override;
     size_t memory_bytes() const override;
@@ -126,6 +132,8 @@ public:
     virtual bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const = 0;
     /// The parameters (u, v) of a hit. Candidates that are not the nearest hit, and shadow rays, do not need them.
     virtual Vec2 parameters(Vec3 local) const = 0;
+    /// The parameters of a point of a grid over the shape: the unit square covers the shape once.
+    virtual Vec2 grid_parameters(Vec2 in_square) const { return in_square; }
 };
 
 /// Sphere with (u, v) = (azimuth over 2π, polar angle over π) about the axis from its centre through the origin: so
@@ -140,6 +148,7 @@ public:
     Bounds3 bounds() const override;
     double area() const override;
     SurfaceGeometry surface(uint32_t, float u, float v, bool tangents) const override;
+    std::optional<SurfaceJet> jet(uint32_t, Vec3d o, Vec3d d, double near) const override;
     float slack(uint32_t) const override { return slack_; }
     ShapeSample sample(uint32_t, Vec2 u) const override;
     bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const override;
@@ -160,7 +169,8 @@ private:
     bool flip_;
 };
 
-/// Affine image of the unit disc in the xy plane with normal +z; (u, v) = (radius, azimuth over 2π).
+/// Affine image of the unit disc in the xy plane with normal +z; texture coordinates (radius, azimuth over 2π). The
+/// parameters (u, v) are the disc's own x and y, relative to the disc's point nearest to the origin: see Sphere.
 class Disk final : public AnalyticShape {
 public:
     Disk(const Transform& to_world, bool flip_normals);
@@ -168,17 +178,21 @@ public:
     Bounds3 bounds() const override;
     double area() const override;
     SurfaceGeometry surface(uint32_t, float u, float v, bool tangents) const override;
+    std::optional<SurfaceJet> jet(uint32_t, Vec3d o, Vec3d d, double near) const override;
     ShapeSample sample(uint32_t, Vec2 u) const override;
     bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const override;
     Vec2 parameters(Vec3 local) const override;
+    Vec2 grid_parameters(Vec2 in_square) const override;
 
 private:
     Transform to_world_, to_local_;
+    std::array<double, 2> near_;  ///< Own coordinates of the point nearest to the origin.
     Vec3 ng_;
 };
 
-/// Open cylinder from p0 to p1 under a transform without shear; normals point outward; (u, v) = (azimuth over 2π,
-/// height over length).
+/// Open cylinder from p0 to p1 under a transform without shear; normals point outward; texture coordinates (azimuth
+/// over 2π, height over length). The parameters (u, v) are the same, relative to the cylinder's point nearest to the
+/// origin: see Sphere.
 class Cylinder final : public AnalyticShape {
 public:
     /// `to_world` maps the unit cylinder about +z (radius 1, z in [0, 1]) to the world.
@@ -187,12 +201,15 @@ public:
     Bounds3 bounds() const override;
     double area() const override;
     SurfaceGeometry surface(uint32_t, float u, float v, bool tangents) const override;
+    std::optional<SurfaceJet> jet(uint32_t, Vec3d o, Vec3d d, double near) const override;
     ShapeSample sample(uint32_t, Vec2 u) const override;
     bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const override;
     Vec2 parameters(Vec3 local) const override;
+    Vec2 grid_parameters(Vec2 in_square) const override;
 
 private:
     Transform to_world_, to_local_;
+    std::array<double, 3> near_;  ///< Own coordinates of the point nearest to the origin.
     float radius_, height_;
     bool flip_;
 };

@@ -7,6 +7,7 @@
 #include "integrator/path.h"
 
 #include "integrator/guiding.h"
+#include "integrator/specular.h"
 #include "pathspace/eye_paths.h"
 
 namespace etendue {
@@ -15,7 +16,7 @@ namespace {
 class PathIntegrator final : public Integrator {
 public:
     explicit PathIntegrator(const IntegratorParams& p)
-        : depth_(DepthOptions::from(p)), guiding_(p) {}
+        : depth_(DepthOptions::from(p)), guiding_(p), specular_(p) {}
 
     void save(LearnedState& to) const override { guiding_.save(to); }
     void load(LearnedState& from) override { guiding_.load(from); }
@@ -32,17 +33,22 @@ public:
         const TechniqueCounts counts = this->counts(c.scene, 0);
         const SubPath& z = work.z;
         for (int t = 2; t <= z.size(); ++t) {
-            for_each_hit(c.scene, z, t, counts,
-                         [&](const Join& j) { c.sink.add(j, j.contribution); });
+            for_each_hit(c.scene, z, t, counts, [&](const Join& j) {
+                c.sink.add(specular_.weighed_hit(j, c.scene, z, t, counts), j.contribution);
+            });
             if (t > depth_.max_depth) break;
             if (const auto j = join_next_event(c.scene, z, t, c.sampler, counts))
                 if (const float Tr = visibility(c.scene, *j, work.stats); Tr > 0)
                     c.sink.add(*j, j->contribution * Tr);
+            specular_.add(c, t, depth_.max_depth, counts, work);
         }
     }
 
     TechniqueCounts counts(const Scene&, uint64_t /*light_paths*/) const override {
-        return {.hit = 1, .next_event = 1, .guide = guiding_.guide()};
+        return {.hit = 1,
+                .next_event = 1,
+                .guide = guiding_.guide(),
+                .specular_depth = specular_.depth()};
     }
     uint64_t light_paths(const Scene&) const override { return 0; }
     std::vector<std::pair<std::string, double>> figures() const override {
@@ -54,6 +60,7 @@ public:
 private:
     DepthOptions depth_;
     Guiding guiding_;
+    Specular specular_;
 };
 
 }  // namespace
@@ -61,7 +68,7 @@ private:
 IntegratorEntry path_entry() {
     return {{"integrator", "path",
              "Path tracing with next event estimation and MIS, the simplest method. Unbiased.",
-             concat({depth_params(), Guiding::params()})},
+             concat({depth_params(), Specular::params(), Guiding::params()})},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<PathIntegrator>(p);
             }};

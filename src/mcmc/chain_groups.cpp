@@ -12,11 +12,8 @@
 namespace etendue {
 namespace {
 
-/// Purposes of the random numbers of a group.
-enum Purpose : uint64_t { kPool, kResampling, kSteps, kThinning, kLater };
-
-/// Finds that are kept for each chain.
-constexpr size_t kFindsOfChain = 16;
+/// Finds that are kept for each chain of a class; and at most of one chain in a pass.
+constexpr size_t kFindsOfChain = 16, kFindsOfPass = 4 * kFindsOfChain;
 
 /// Generations start before the turns 0, 1, 4, 16 …
 bool begins_generation(uint32_t turn) {
@@ -39,6 +36,33 @@ private:
 };
 
 }  // namespace
+
+/// Keys of the random numbers of a turn, one for each purpose. What is numbered has a key hash_combine(purpose, number), and
+/// no key is used for two things.
+struct ChainGroups::TurnKeys {
+    uint64_t pool, resampling, steps, thinning, later, thinning_of_chains;
+
+    explicit TurnKeys(uint64_t turn)
+        : pool(hash_combine(turn, 0)), resampling(hash_combine(turn, 1)),
+          steps(hash_combine(turn, 2)), thinning(hash_combine(turn, 3)),
+          later(hash_combine(turn, 4)), thinning_of_chains(hash_combine(turn, 5)) {}
+};
+
+struct ChainGroups::Turn {
+    size_t group;
+    TurnKeys keys;
+    bool is_new;       ///< Whether the group begins with a pool.
+    bool starts;       ///< Whether its chains start anew.
+    uint64_t steps;    ///< Of each chain.
+    uint64_t samples;  ///< Later ones.
+};
+
+/// What the steps of each chain have made.
+struct ChainGroups::Steps {
+    std::vector<double> scales;  ///< By class.
+    std::vector<ChainStats> stats;
+    std::vector<std::vector<Find>> finds;
+};
 
 std::vector<ClassPlan> share_out(double b, std::vector<double> b_of_class,
                                  std::span<const double> cost, int chains) {
@@ -81,6 +105,9 @@ void ChainGroups::sample(const PassContext& pass, uint64_t key, uint64_t count,
                          Group& group) const {
     constexpr uint64_t kChunk = 64, kChunks = 4096;
     constexpr size_t kMost = 16;  // finds of a class that a chunk keeps
+    // What thins out samples must not depend on their numbers, which are hashes of the key of the sample.
+    const uint64_t of_samples = hash_combine(key, 0), of_chunks = hash_combine(key, 1),
+                   of_batches = hash_combine(key, 2);
     struct Chunk {
         std::vector<std::vector<Find>> finds;
         std::vector<double> sums;
@@ -97,12 +124,12 @@ void ChainGroups::sample(const PassContext& pass, uint64_t key, uint64_t count,
             std::vector<Find> found;
             const uint64_t begin = first + i * kChunk;
             for (uint64_t at = begin; at < std::min(end, begin + kChunk); ++at)
-                space_.sample(hash_combine(key, at), {whole.sample, work}, found);
+                space_.sample(hash_combine(of_samples, at), {whole.sample, work}, found);
             for (const Find& f : found) {
                 chunk.finds[size_t(f.chain_class)].push_back(f);
                 chunk.sums[size_t(f.chain_class)] += f.weight;
             }
-            const double u = to_unit_double(hash_combine(hash_combine(key, kThinning), begin));
+            const double u = to_unit_double(hash_combine(of_chunks, begin));
             for (auto& finds : chunk.finds) thin(finds, kMost, u);
         });
         for (size_t k = 0; k < plan_.size(); ++k)
@@ -111,7 +138,7 @@ void ChainGroups::sample(const PassContext& pass, uint64_t key, uint64_t count,
                                       chunk.finds[k].end());
                 group.normalisation[k].later_sum += chunk.sums[k];
             }
-        thin_finds(hash_combine(key, end), group);
+        thin_finds(hash_combine(of_batches, end), group);
     }
     for (Normalisation& n : group.normalisation) n.later += double(count);
 }
@@ -119,7 +146,7 @@ void ChainGroups::sample(const PassContext& pass, uint64_t key, uint64_t count,
 void ChainGroups::thin_finds(uint64_t key, Group& group) const {
     for (size_t k = 0; k < plan_.size(); ++k)
         thin(group.finds[k], kFindsOfChain * size_t(plan_[k].chains),
-             to_unit_double(hash_combine(hash_combine(key, kThinning), k)));
+             to_unit_double(hash_combine(key, k)));
 }
 
 void ChainGroups::start(const PassContext& pass, uint64_t key, Group& group) const {
@@ -128,7 +155,7 @@ void ChainGroups::start(const PassContext& pass, uint64_t key, Group& group) con
         const int count = plan_[k].chains;
         const std::vector<Find>& finds = group.finds[k];
         group.normalisation[k].pool_all();
-        const double u = to_unit_double(hash_combine(hash_combine(key, kResampling), k));
+        const double u = to_unit_double(hash_combine(key, k));
         const std::vector<size_t> seeds = resample(finds, size_t(count), u);
         for (int i = 0; i < count; ++i) group.chains[first + size_t(i)].start_black();
         pass.for_each_other_path(seeds.size(), [&](uint64_t i, Sampler&, Workspace& work) {
@@ -157,83 +184,102 @@ void ChainGroups::advance(const PassContext& pass) {
 }
 
 void ChainGroups::advance(const PassContext& pass, const MakeSink& make_sink) {
+    const Turn turn = begin_turn(pass);
+    if (turn.is_new) sample(pass, turn.keys.pool, options_.pool, working_);
+    sample(pass, turn.keys.later, turn.samples, working_);
+    if (turn.starts) start(pass, turn.keys.resampling, working_);
+    settle(turn, step(pass, turn, make_sink));
+}
+
+ChainGroups::Turn ChainGroups::begin_turn(const PassContext& pass) {
     const size_t g = pass.index % groups_.size();
-    const bool starts_each_pass = options_.starts == Starts::EachPass;
+    const Group& group = groups_[g];
+    const bool is_new = options_.starts == Starts::EachPass || !group.has_begun();
+    const bool has_generations = options_.starts == Starts::ByGeneration;
     working_group_ = g;
-    const bool is_new = starts_each_pass || !groups_[g].has_begun();
-    working_.turns = groups_[g].turns;
+    working_.turns = group.turns;
     if (is_new) {
         working_.normalisation.assign(plan_.size(), {});
         working_.finds.assign(plan_.size(), {});
     } else {
         for (size_t i = 0; i < working_.chains.size(); ++i)
-            working_.chains[i].copy(groups_[g].chains[i]);
-        working_.normalisation = groups_[g].normalisation;
-        working_.finds = groups_[g].finds;
+            working_.chains[i].copy(group.chains[i]);
+        working_.normalisation = group.normalisation;
+        working_.finds = group.finds;
     }
-    const bool starts =
-        is_new || (options_.starts == Starts::ByGeneration && begins_generation(working_.turns));
-    const uint64_t key = hash_combine(
-        hash_combine(hash_combine(pass.seed, 0x636861696e), uint64_t(g)), working_.turns);
-
     // Made before the pass, so that nothing can fail once it is finished.
-    if (groups_[g].chains.empty())
+    if (group.chains.empty())
         for (size_t i = spare_.size(); i < class_of_chain_.size(); ++i)
             spare_.emplace_back(space_, class_of_chain_[i]);
 
-    const size_t chains = working_.chains.size();
-    const uint64_t steps =
-        uint64_t(std::ceil(options_.mutations * double(pass.pixels) / double(chains)));
-    if (is_new) sample(pass, hash_combine(key, kPool), options_.pool, working_);
-    const auto later = options_.starts == Starts::ByGeneration
-                           ? uint64_t(std::ceil(options_.later * double(steps * chains)))
-                           : 0;
-    sample(pass, hash_combine(key, kLater), later, working_);
-    if (starts) start(pass, key, working_);
+    const auto chains = double(working_.chains.size());
+    const auto steps = uint64_t(std::ceil(options_.mutations * double(pass.pixels) / chains));
+    const auto samples =
+        has_generations ? uint64_t(std::ceil(options_.later * double(steps) * chains)) : 0;
+    const uint64_t key =
+        hash_combine(hash_combine(hash_combine(pass.seed, 0x636861696e), uint64_t(g)), group.turns);
+    return {.group = g,
+            .keys = TurnKeys(key),
+            .is_new = is_new,
+            .starts = is_new || (has_generations && begins_generation(group.turns)),
+            .steps = steps,
+            .samples = samples};
+}
 
-    std::vector<double> scales;
-    for (size_t k = 0; k < plan_.size(); ++k) scales.push_back(scale(g, working_, int(k)));
-    std::vector<ChainStats> stats(chains);
+ChainGroups::Steps ChainGroups::step(const PassContext& pass, const Turn& turn,
+                                     const MakeSink& make_sink) {
+    const size_t chains = working_.chains.size();
+    Steps made{.scales = {},
+               .stats = std::vector<ChainStats>(chains),
+               .finds = std::vector<std::vector<Find>>(chains)};
+    for (size_t k = 0; k < plan_.size(); ++k)
+        made.scales.push_back(scale(turn.group, working_, int(k)));
     const bool keeps_finds = options_.starts == Starts::ByGeneration;
-    std::vector<std::vector<Find>> finds(chains);
     pass.for_each_chain(chains, [&](uint64_t i, SplatSink& splats, Workspace& work) {
         const WholeFilm whole(pass);
-        const size_t k = size_t(class_of_chain_[i]);
-        const double mean = 1 / (double(steps) * double(plan_[k].chains));
+        const auto k = size_t(class_of_chain_[i]);
+        const double mean = 1 / (double(turn.steps) * double(plan_[k].chains));
         const ChainContext c{whole.sample, work};
         const auto states = make_sink(i, class_of_chain_[i], c, splats);
-        working_.chains[i].advance({options_.p_large, plan_[k].c}, scales[k],
+        std::vector<Find>& finds = made.finds[i];
+        working_.chains[i].advance({options_.p_large, plan_[k].c}, made.scales[k],
                                    mean * double(pass.light_paths),
-                                   hash_combine(hash_combine(key, kSteps), i), steps, c, *states,
-                                   stats[i], keeps_finds ? &finds[i] : nullptr);
+                                   hash_combine(turn.keys.steps, i), turn.steps, c, *states,
+                                   made.stats[i], keeps_finds ? &finds : nullptr);
+        // In a long pass, all chains together would find very many.
+        thin(finds, kFindsOfPass, to_unit_double(hash_combine(turn.keys.thinning_of_chains, i)));
+        finds.shrink_to_fit();
     });
+    return made;
+}
 
+void ChainGroups::settle(const Turn& turn, const Steps& made) {
     working_stats_ = {};
-    working_stats_.later_samples = later;
+    working_stats_.later_samples = turn.samples;
     double own = 0, all = 0;
-    for (size_t i = 0; i < chains; ++i) {
-        const size_t k = size_t(class_of_chain_[i]);
-        const ChainStats& s = stats[i];
-        const double chain_light = s.chain_light / double(plan_[k].chains),
-                     large_light = s.large_light / double(plan_[k].chains);
+    for (size_t i = 0; i < made.stats.size(); ++i) {
+        const auto k = size_t(class_of_chain_[i]);
+        const ChainStats& s = made.stats[i];
+        const double scale = made.scales[k], chains = double(plan_[k].chains),
+                     chain_light = s.chain_light / chains, large_light = s.large_light / chains;
         all += chain_light + large_light;
-        own +=
-            large_light +
-            (scales[k] != 0 ? chain_light * working_.normalisation[k].later_b() / scales[k] : 0.0);
+        own += large_light +
+               (scale != 0 ? chain_light * working_.normalisation[k].later_b() / scale : 0.0);
         working_stats_ += s;
     }
     own_scale_ = all > 0 ? own / all : 1.0;
-    for (size_t i = 0; i < chains; ++i) {
-        Normalisation& n = working_.normalisation[size_t(class_of_chain_[i])];
-        n.later_sum += options_.large_step * stats[i].large_sum;
-        n.later += options_.large_step * double(stats[i].large_steps);
-        for (Find& f : finds[i]) {
+    for (size_t i = 0; i < made.stats.size(); ++i) {
+        const auto k = size_t(class_of_chain_[i]);
+        Normalisation& n = working_.normalisation[k];
+        n.later_sum += options_.large_step * made.stats[i].large_sum;
+        n.later += options_.large_step * double(made.stats[i].large_steps);
+        for (Find f : made.finds[i]) {
             f.weight *= options_.large_step;
-            working_.finds[size_t(class_of_chain_[i])].push_back(f);
+            working_.finds[k].push_back(f);
         }
     }
-    if (keeps_finds)
-        thin_finds(key, working_);
+    if (options_.starts == Starts::ByGeneration)
+        thin_finds(turn.keys.thinning, working_);
     else
         working_.finds.clear();
     ++working_.turns;
@@ -264,25 +310,35 @@ void ChainGroups::save(LearnedState& to) const {
 }
 
 void ChainGroups::load(LearnedState& from) {
+    const auto fail = [] { throw std::runtime_error("the learned state is that of other chains"); };
     for (Group& g : groups_) {
-        uint64_t chains = 0;
+        uint64_t chains = 0, classes = 0;
         from.get(chains);
         from.get(g.normalisation);
         from.get(g.turns);
-        uint64_t classes = 0;
         from.get(classes);
-        if (classes > plan_.size())
-            throw std::runtime_error("the learned state is of another number of classes");
+        if (classes > plan_.size() || chains > class_of_chain_.size()) fail();
         g.finds.resize(size_t(classes));
         for (auto& finds : g.finds) from.get(finds);
-        if (chains != 0 && chains != class_of_chain_.size())
-            throw std::runtime_error("the learned state is of another number of chains");
         g.chains.clear();
         for (uint64_t i = 0; i < chains; ++i)
             g.chains.emplace_back(space_, class_of_chain_[i]).load(from);
+        if (!is_consistent(g)) fail();
     }
     from.get(stats_);
     from.get(own_scale_);
+}
+
+bool ChainGroups::is_consistent(const Group& g) const {
+    const bool keeps_chains = g.has_begun() && options_.starts != Starts::EachPass,
+               keeps_finds = g.has_begun() && options_.starts == Starts::ByGeneration;
+    if (g.chains.size() != (keeps_chains ? class_of_chain_.size() : 0)) return false;
+    if (g.normalisation.size() != (g.has_begun() ? plan_.size() : 0)) return false;
+    if (g.finds.size() != (keeps_finds ? plan_.size() : 0)) return false;
+    for (size_t k = 0; k < g.finds.size(); ++k)
+        for (const Find& f : g.finds[k])
+            if (f.chain_class != int(k)) return false;
+    return true;
 }
 
 double ChainGroups::later_b(const Group& group) const {

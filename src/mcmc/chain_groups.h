@@ -101,6 +101,16 @@ private:
         bool has_begun() const { return turns > 0; }
     };
 
+    struct TurnKeys;
+    struct Turn;
+    struct Steps;
+
+    /// A turn of the group of the pass. Makes `working_` a copy of it.
+    Turn begin_turn(const PassContext& pass);
+    Steps step(const PassContext& pass, const Turn& turn, const MakeSink& make_sink);
+    /// Adds what the steps have found to the pool.
+    void settle(const Turn& turn, const Steps& made);
+
     /// Draws samples, as later ones of the pool.
     void sample(const PassContext& pass, uint64_t key, uint64_t count, Group& group) const;
     void thin_finds(uint64_t key, Group& group) const;
@@ -108,6 +118,8 @@ private:
     /// Scale of a pass of group g; `group` is its state, since it may have started in this pass.
     double scale(size_t g, const Group& group, int chain_class) const;
     double later_b(const Group& group) const;
+    /// Whether a group that was read has what one of these options has.
+    bool is_consistent(const Group& group) const;
 
     const StateSpace& space_;
     ChainOptions options_;

@@ -52,6 +52,8 @@ double PathPdfs::sampled(const Technique& q, const TechniqueCounts& counts) cons
 }
 
 double mis_weight(const PathPdfs& pdfs, const Technique& technique, const TechniqueCounts& counts) {
+    const double specular = pdfs.specular_weight();
+    if (technique.strategy == Strategy::Specular) return specular;
     double sum = 0;
     const auto add = [&](const Technique& q) { sum += sqr(pdfs.sampled(q, counts)); };
     const int n = pdfs.vertices();
@@ -62,7 +64,7 @@ double mis_weight(const PathPdfs& pdfs, const Technique& technique, const Techni
         add({Strategy::Merge, s, n + 1 - s});
         for (const bool drops_eye : {false, true}) add({Strategy::Gather, s, n + 1 - s, drops_eye});
     }
-    return sqr(pdfs.sampled(technique, counts)) / sum;
+    return sqr(pdfs.sampled(technique, counts)) / sum * (1 - specular);
 }
 
 std::vector<const Vertex*> path_vertices(const SubPath& y, int s, const SubPath& z, int t,

@@ -19,6 +19,15 @@ struct PathPdfs {
     std::vector<uint8_t> pair_level;     ///< See Vertex.
     std::vector<bool> is_fixed_by_film;  ///< See Vertex.
     double next_event = 0;               ///< p_NE(x_0), sampled from x_1.
+    /// Of the specular connection that can make the path, p̂ over the density of the hit; 0 where there is none. The
+    /// caller sets it, since it depends on more than the vertices. It shares the path with hits alone: the weights of
+    /// all others have the factor 1 - w of the hit.
+    double specular_ratio = 0;
+    /// Weight of the specular connection against the hit.
+    double specular_weight() const {
+        return can_hit_emitter ? sqr(specular_ratio) / (1 + sqr(specular_ratio))
+                               : double(specular_ratio > 0);
+    }
     bool can_hit_emitter = true;
     bool can_connect_ends =
         true;  ///< False where both ends are at infinity, or x_0 is of a delta emitter.

@@ -41,6 +41,10 @@ struct RenderStats {
     uint64_t trials = 0, trial_rays = 0;  ///< Of all visible pairs.
     /// Visible pairs by trials: 1, 2, 3–4, 5–8, … The share of those with 1 is 1 - Var(r)/E(r)².
     std::array<uint64_t, 24> pairs_by_trials{};
+    uint64_t chains = 0;           ///< Found by specular connections, and evaluated.
+    uint64_t chain_seeds = 0;      ///< From which Newton's method started, or could not start.
+    uint64_t chain_trials = 0;     ///< Those of them that were trials.
+    uint64_t chain_rays = 0;       ///< Of seeds and of Newton's method.
     uint64_t bounds_exceeded = 0;  ///< Densities above their assumed bound; must be 0.
     uint64_t runaways = 0;         ///< Pairs abandoned after too many trials; must be 0.
     uint64_t rejected = 0;         ///< Contributions that were not finite or negative.
@@ -50,7 +54,7 @@ struct RenderStats {
                                            pairs_by_trials.size() - 1)];
     }
     RenderStats& operator+=(const RenderStats& o);
-    uint64_t rays() const { return walk_rays + shadow_rays + trial_rays; }
+    uint64_t rays() const { return walk_rays + shadow_rays + trial_rays + chain_rays; }
 };
 
 /// Adds the time until its destruction to a phase, if the sample is timed.

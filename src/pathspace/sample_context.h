@@ -29,7 +29,8 @@ struct PassDropped {};
 struct Workspace {
     SubPath y, z;
     std::vector<SubPath> eye_paths;  ///< Of further samples.
-    SubPath pair;                    ///< The stored light path of a merge or gather.
+    /// The stored light path of a merge or gather, or y_0 … y_{s-1} of a specular connection.
+    SubPath pair;
     Vertex scratch;
     std::vector<float> masses;  ///< Of light vertices, for one eye vertex.
     bool is_observed =
@@ -39,6 +40,10 @@ struct Workspace {
     const std::atomic<bool>* drop =
         nullptr;  ///< Whether the pass is to be discarded; nullptr: never.
 
+    /// The light vertices of a path made by the technique; only its first s vertices belong to it.
+    const SubPath& light_side(const Technique& q) const {
+        return has_own_light_side(q.strategy) ? pair : y;
+    }
     /// Throws PassDropped if the pass is to be discarded. What makes many paths for one sample calls it again and again.
     void go_on() const {
         if (drop && drop->load(std::memory_order_relaxed)) throw PassDropped();

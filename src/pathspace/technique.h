@@ -15,14 +15,20 @@ enum class Strategy : uint8_t {
     NextEvent,  ///< C(1,t), t ≥ 2: a point sampled on an emitter for z_{t-1}.
     Connect,    ///< C(s,t), s ≥ 2, t ≥ 2; for s = 1, with y_0 of a light path.
     Splat,  ///< C(s,1): the light path is connected to the lens. Methods with hits do not use C(1,1).
-    HitLens,  ///< C(s,0): the light path hits a finite lens.
-    Merge,    ///< M(s,t): y_{s-1} and z_{t-1}, near each other, are treated as one vertex.
-    Gather,   ///< U(s,t): one vertex of such a pair is dropped; a shadow ray connects the rest.
+    HitLens,   ///< C(s,0): the light path hits a finite lens.
+    Merge,     ///< M(s,t): y_{s-1} and z_{t-1}, near each other, are treated as one vertex.
+    Gather,    ///< U(s,t): one vertex of such a pair is dropped; a shadow ray connects the rest.
+    Specular,  ///< X(s,t): s-1 delta events between y_0 and z_{t-1}, found by Newton's method.
 };
 
 /// Whether y_{s-1} and z_{t-1} stand for one vertex of the full path.
 constexpr bool is_pair(Strategy strategy) {
     return strategy == Strategy::Merge || strategy == Strategy::Gather;
+}
+
+/// Whether the light vertices are others than those of the sample's light path (Workspace::light_side()).
+constexpr bool has_own_light_side(Strategy strategy) {
+    return is_pair(strategy) || strategy == Strategy::Specular;
 }
 
 struct Technique {
@@ -120,6 +126,7 @@ struct TechniqueCounts {
     /// gathers.
     float continued = 1;
     const Guide* guide = nullptr;  ///< Guide of both walks; nullptr if they have none.
+    int specular_depth = 0;  ///< Most delta events of X(s,t); 0 where there is no such technique.
 
     friend bool operator==(const TechniqueCounts&, const TechniqueCounts&) = default;
     bool uses_light_paths() const {
@@ -157,6 +164,7 @@ struct TechniqueCounts {
         case Strategy::HitLens: return hit_lens;
         case Strategy::Merge: return merge;
         case Strategy::Gather: return gathers(q.vertices() - 1);
+        case Strategy::Specular: return q.s >= 2 && q.s - 1 <= specular_depth ? 1 : 0;
         }
         return 0;
     }

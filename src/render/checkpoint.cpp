@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "description/fingerprint.h"
+#include "description/json_text.h"
 #include "geometry/ray_tracer.h"
 #include "math/content_hash.h"
 #include "render/method_choice.h"
@@ -26,20 +27,13 @@ const char* yes_or_no(bool b) {
     return b ? "yes" : "no";
 }
 
-/// A text as it is read again from a header, where names of files that are not UTF-8 have marks in their place.
-std::string as_read(const std::string& text) {
-    using nlohmann::json;
-    return json::parse(json(text).dump(-1, ' ', false, json::error_handler_t::replace))
-        .get<std::string>();
-}
-
 /// The parameters with those that were not given.
 std::string with_defaults(const IntegratorSpec& spec) {
     if (spec.make) return spec.to_string();
     IntegratorSpec full = spec;
     for (const ParamInfo& p : integrator_entry(spec.name).info.params)
         full.params.emplace(p.name, p.fallback);
-    return as_read(full.to_string());
+    return as_utf8(full.to_string());
 }
 
 /// Hash of the file that the parameters name.
@@ -69,7 +63,7 @@ CheckpointHeader header_of(const Renderer& renderer, const Scene& scene,
             .film = scene.film(),
             .technique_depth = settings.technique_depth,
             .conditions = conditions,
-            .choice = settings.choice ? settings.choice->to_json().dump() : ""};
+            .choice = settings.choice ? settings.choice->to_text() : ""};
 }
 
 }  // namespace

@@ -9,7 +9,10 @@ namespace etendue {
 
 /// Seconds that one thread of a usual machine takes for what `stats` has counted of a method, in a scene of middle size. In
 /// one scene, methods are to each other as these figures are, within about a fifth.
-double simulated_seconds(const std::string& method, const RenderStats& stats);
+/// `is_guided`: whether a guide chooses directions at surfaces.
+double simulated_seconds(const std::string& method, bool is_guided, const RenderStats& stats);
+/// Cost of a sample relative to one of the same method without guide.
+double guided_factor(bool is_guided);
 /// The same for a sample of a method of which nothing is known yet.
 double typical_sample_seconds(const std::string& method);
 /// The same for a guide that is trained by so many walks of each kind.

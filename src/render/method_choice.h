@@ -1,6 +1,7 @@
 #pragma once
 // `auto`: pilots on a small film choose the method of a rendering. See docs/integrators/auto.md.
 
+#include <atomic>
 #include <string>
 #include <vector>
 
@@ -33,16 +34,22 @@ struct MethodChoice {
     /// One line for the log.
     std::string message() const;
     nlohmann::ordered_json to_json() const;
+    /// The same as one line of text; names of files that are not UTF-8 have marks in it, see as_utf8().
+    std::string to_text() const;
     /// From the text of to_json(); throws std::runtime_error if it is none.
     static MethodChoice from_json(const std::string& text);
 };
 
+inline const std::atomic<bool> kNeverDrop{false};
+
 /// The same settings. If their integrator is `auto`, it is replaced by a method that pilots choose, and `choice` is set.
 ///
 /// The method is a function of the scene, the seed, the limits and the other settings that decide the image, but not of
-/// the number of threads or processes, the first pass, or any clock. The pilots have random numbers of their own: passes
-/// do not depend on them.
-RenderSettings with_chosen_method(const Scene& scene, const RenderSettings& settings);
+/// the number of threads, the first pass, or any clock. Where several processes render together, chains are no candidates;
+/// else their number does not matter. The pilots have random numbers of their own: passes do not depend on them. Throws
+/// PassDropped once `drop` is set.
+RenderSettings with_chosen_method(const Scene& scene, const RenderSettings& settings,
+                                  const std::atomic<bool>& drop = kNeverDrop);
 /// The same where an earlier rendering has chosen already. Throws std::runtime_error if it was asked for something else.
 RenderSettings with_chosen_method(const RenderSettings& settings, const MethodChoice& earlier);
 

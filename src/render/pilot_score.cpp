@@ -8,31 +8,23 @@
 namespace etendue {
 namespace {
 
-/// A mean of independent values, and its standard error.
-struct Estimate {
-    double mean = 0, error = 0;
-
-    double low(double errors) const { return mean - errors * error; }
-    static Estimate of(const std::vector<double>& values) {
-        Estimate e;
-        for (const double v : values) e.mean += v / double(values.size());
-        double squares = 0;
-        for (const double v : values) squares += (v - e.mean) * (v - e.mean);
-        e.error = std::sqrt(squares / (double(values.size()) * double(values.size() - 1)));
-        return e;
-    }
-};
+double standard_error(const Moments& m) {
+    return std::sqrt(m.squared_error());
+}
 
 /// Variance of independent values, of which differences d beyond V count V |d| instead of d². From pairs, since a mean would
-/// have a part of a spike.
-double limited_variance(const std::vector<double>& values, double V) {
+/// have a part of a spike. Values of one sequence of `in_sequence` are no pair.
+double limited_variance(const std::vector<double>& values, double V, int in_sequence = 1) {
+    const auto together = size_t(in_sequence);
     double sum = 0;
+    size_t pairs = 0;
     for (size_t i = 0; i < values.size(); ++i)
-        for (size_t j = 0; j < i; ++j) {
+        for (size_t j = 0; j < i - i % together; ++j) {
             const double d = std::abs(values[i] - values[j]);
             sum += std::min(d, V) * d;
+            ++pairs;
         }
-    return sum / double(values.size() * (values.size() - 1));
+    return pairs > 0 ? sum / double(2 * pairs) : 0.0;
 }
 
 /// Parts of the film, of about equal size.
@@ -66,9 +58,9 @@ private:
         return {width_, height_, std::min(columns, width_), std::min(rows, height_)};
     }
     /// The mean of a tile in each image of a method.
-    std::vector<Estimate> estimates(const Tiles& tiles, const PilotImages& of) const {
+    std::vector<Moments> estimates(const Tiles& tiles, const PilotImages& of) const {
         const auto count = size_t(tiles.count());
-        std::vector<std::vector<double>> values(count);
+        std::vector<Moments> all(count);
         std::vector<double> pixels(count);
         for (int y = 0; y < height_; ++y)
             for (int x = 0; x < width_; ++x) ++pixels[size_t(tiles.of(x, y))];
@@ -77,16 +69,14 @@ private:
             for (int y = 0; y < height_; ++y)
                 for (int x = 0; x < width_; ++x)
                     sums[size_t(tiles.of(x, y))] += double(image[pixel(x, y)]);
-            for (size_t t = 0; t < count; ++t) values[t].push_back(sums[t] / pixels[t]);
+            for (size_t t = 0; t < count; ++t) all[t].add(sums[t] / pixels[t]);
         }
-        std::vector<Estimate> all;
-        for (const auto& v : values) all.push_back(Estimate::of(v));
         return all;
     }
     /// The estimates of all methods by tile, and µ of each tile: the largest mean less its error. Spikes have large errors,
     /// and methods that miss light small means.
     struct Means {
-        std::vector<std::vector<Estimate>> by_method;
+        std::vector<std::vector<Moments>> by_method;
         std::vector<double> mu;
         double whole = 0;  ///< m
 
@@ -101,7 +91,8 @@ private:
         for (const PilotImages& of : methods_) m.by_method.push_back(estimates(tiles, of));
         for (size_t t = 0; t < size_t(tiles.count()); ++t) {
             m.mu.push_back(0);
-            for (const auto& of : m.by_method) m.mu.back() = std::max(m.mu.back(), of[t].low(1));
+            for (const auto& of : m.by_method)
+                m.mu.back() = std::max(m.mu.back(), of[t].mean() - standard_error(of[t]));
             m.whole += m.mu.back() / double(tiles.count());
         }
         return m;
@@ -112,18 +103,27 @@ private:
         const Means m = means(tiles);
         if (!(m.whole > 0)) return;
         for (size_t i = 0; i < methods_.size(); ++i) {
-            const auto& images = methods_[i].images;
-            const double N = methods_[i].horizon;
-            std::vector<double> values(images.size());
-            double sum = 0;
+            const PilotImages& of = methods_[i];
+            const auto& images = of.images;
+            const double N = of.horizon;
+            const auto together = size_t(of.in_sequence);
+            std::vector<double> values(images.size()), means(images.size() / together);
+            double sum = 0, of_sequences = 0;
             for (int y = 0; y < height_; ++y)
                 for (int x = 0; x < width_; ++x) {
                     const auto tile = size_t(tiles.of(x, y));
-                    for (size_t k = 0; k < images.size(); ++k)
+                    const double V = m.limit(tile, N);
+                    std::fill(means.begin(), means.end(), 0.0);
+                    for (size_t k = 0; k < images.size(); ++k) {
                         values[k] = double(images[k][pixel(x, y)]);
-                    sum += limited_variance(values, m.limit(tile, N)) / m.norm(tile);
+                        means[k / together] += values[k] / double(together);
+                    }
+                    sum += limited_variance(values, V, of.in_sequence) / m.norm(tile);
+                    of_sequences += limited_variance(means, V / double(together)) / m.norm(tile);
                 }
             scores[i].noise = sum / (double(width_) * double(height_)) / N;
+            if (of.in_sequence > 1 && sum > 0)
+                scores[i].noise *= std::min(1.0, double(of.in_sequence) * of_sequences / sum);
             if (methods_[i].pixels_in_one > 1)
                 scores[i].noise = std::min(
                     scores[i].noise, std::max(scores[i].noise * of_small_pixels(methods_[i], m),
@@ -172,9 +172,9 @@ private:
                 const double errors =
                     student_quantile(2 * kDoubt / double(count), double(images) - 1);
                 for (size_t t = 0; t < count; ++t) {
-                    const Estimate &own = m.by_method[i][t], &other = m.by_method[j][t];
-                    lacks[t] = std::max(lacks[t], other.mean - own.mean -
-                                                      errors * std::hypot(own.error, other.error));
+                    const Moments &own = m.by_method[i][t], &other = m.by_method[j][t];
+                    const double error = std::sqrt(own.squared_error() + other.squared_error());
+                    lacks[t] = std::max(lacks[t], other.mean() - own.mean() - errors * error);
                 }
             }
             const double N = methods_[i].horizon;
@@ -195,6 +195,25 @@ private:
 
 std::vector<PilotScore> score_pilots(std::span<const PilotImages> methods, int width, int height) {
     return Scores(methods, width, height).all();
+}
+
+std::vector<double> reuse_factors(std::span<const NoiseOfFilms> methods, double growth,
+                                  double ratio) {
+    constexpr double kMostGain = kMostGainOfReuse;
+    std::vector<double> gains;
+    double of_others = 0;
+    for (const NoiseOfFilms& m : methods) {
+        const NoiseOfFilms& known = m.like >= 0 ? methods[size_t(m.like)] : m;
+        gains.push_back(known.before > 0 && known.now > 0 ? known.before / known.now : 1.0);
+        if (m.kind == NoiseOfFilms::Kind::Independent)
+            of_others = std::max(of_others, gains.back());
+    }
+    for (size_t i = 0; i < gains.size(); ++i) {
+        const bool gains_further = methods[i].kind == NoiseOfFilms::Kind::Reuse && of_others > 0;
+        const double gain = gains_further ? gains[i] / of_others : 1.0;
+        gains[i] = std::pow(std::clamp(gain, 1.0, kMostGain), -std::log(ratio) / std::log(growth));
+    }
+    return gains;
 }
 
 }  // namespace etendue

@@ -8,6 +8,8 @@
 // - Noise: the variance of an image between its pixels' values, divided by N. Of a difference d beyond V = µ max(16, N),
 //   only V |d| counts instead of d². Such a value would still stand out from the rendering as a spike: whether a pilot has
 //   met one is chance, and its square would decide the score. What counts is its energy, as if it were missing.
+// - Passes that follow each other in a sequence of the sampler complement each other: their mean has less noise than the
+//   mean of as many independent passes. The noise of single images is multiplied by how much less, on average over the film.
 // - Missing light: where the mean of a method certainly lies below that of another one, it lacks light that the other one
 //   has, and will find it in spikes. The lower limit δ of the difference counts V δ, like the energy of spikes that were
 //   met. It is looked for in tiles, in groups of them, and in the whole film; the level with the largest sum counts. The
@@ -31,8 +33,10 @@ struct PilotImages {
     /// Of chains: the number of pixels of the rendering in one of the pilot, at least 1. Of other methods 1, since their
     /// samples are independent.
     double pixels_in_one = 1;
-    double least_variance =
-        0;  ///< Of a pixel of an image of chains, relative, if its states were independent.
+    /// Of a pixel of an image of chains, relative, if its states were independent.
+    double least_variance = 0;
+    /// So many successive images are passes of one sequence, and depend on each other; those of other sequences do not.
+    int in_sequence = 1;
 };
 
 struct PilotScore {
@@ -42,5 +46,21 @@ struct PilotScore {
 
 /// The scores of methods, each with two images or more, on a film of this size.
 std::vector<PilotScore> score_pilots(std::span<const PilotImages> methods, int width, int height);
+
+/// The more light paths there are in a pass, the more of them gathers and merges find: with four times as many, their noise
+/// is at most so many times smaller.
+constexpr double kMostGainOfReuse = 2;
+
+/// The noise of an image of one method, relative to the tiles, on the last two films of pilots.
+struct NoiseOfFilms {
+    enum class Kind { Independent, Reuse, Chains } kind = Kind::Independent;
+    double before = 0, now = 0;  ///< 0: unknown.
+    int like = -1;  ///< A method whose gain is taken instead of its own, which is unknown yet.
+};
+/// Factors of noise for the rendering, whose film has `ratio` times as many pixels as that of the pilots. From the last film
+/// to this one, of `growth` times as many pixels, all methods gain the variation within pixels; the further gain of those that
+/// reuse light paths goes on to the film of the rendering.
+std::vector<double> reuse_factors(std::span<const NoiseOfFilms> methods, double growth,
+                                  double ratio);
 
 }  // namespace etendue

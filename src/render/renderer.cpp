@@ -199,8 +199,6 @@ std::unique_ptr<tbb::global_control> allow_threads(int threads) {
                                                  std::max(size_t(threads), kRoom));
 }
 
-/// Exception that ends a pass which is to be discarded.
-
 /// Throws if several processes cannot render together.
 void check_ranks(const RenderSettings& settings, const Integrator& integrator) {
     if (settings.ranks->count() == 1) return;
@@ -761,7 +759,8 @@ StopReason Renderer::run(const RenderLimits& limits,
         return limits.error ? std::optional(error()) : std::nullopt;
     };
     seconds_ = ranks.of_first(seconds_);
-    double round_seconds = seconds_a_pass();
+    // All processes must come to the same end; each has its own time of the pilots of `auto`.
+    double round_seconds = ranks.of_first(seconds_a_pass());
     // A round is begun only if at least half of it is expected to fit.
     const auto has_no_time = [&] {
         return limits.seconds && film_.passes() > 0 &&

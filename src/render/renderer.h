@@ -139,6 +139,7 @@ public:
     /// Where the last run() has thrown an exception: "pass 4 failed" or, if it was no pass that threw it, "after pass 3".
     std::string place_of_failure() const;
 
+    const Scene& scene() const { return scene_; }
     const Film& film() const { return film_; }
     uint64_t light_paths() const { return light_paths_; }  ///< Number of light paths in a pass.
     const Integrator& integrator() const { return *integrator_; }

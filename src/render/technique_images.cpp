@@ -8,11 +8,13 @@ namespace etendue {
 namespace {
 
 /// Index of a technique in the triangle of (vertices, s), where n vertices have s = 0 … n. Pairs, for which s ≥ 2, and
-/// connections to y_0 have separate indices.
+/// connections to y_0 have separate indices; so have specular connections.
+constexpr size_t kKinds = 3;
 size_t triangle_index(const Technique& q) {
     const size_t n = size_t(q.vertices());
     const bool is_second = is_pair(q.strategy) || (q.strategy == Strategy::Connect && q.s == 1);
-    return 2 * ((n - 2) * (n + 3) / 2 + size_t(q.s)) + is_second;
+    const size_t kind = q.strategy == Strategy::Specular ? 2 : is_second;
+    return kKinds * ((n - 2) * (n + 3) / 2 + size_t(q.s)) + kind;
 }
 
 }  // namespace
@@ -51,7 +53,7 @@ TechniqueImages::TechniqueImages(const FilmGeometry& geometry, const Reconstruct
 TechniqueImages::~TechniqueImages() = default;
 
 size_t TechniqueImages::memory_bytes(uint64_t pixels, int max_edges) {
-    const size_t layers = triangle_index({Strategy::Hit, 0, max_edges + 2}) / 2;
+    const size_t layers = triangle_index({Strategy::Hit, 0, max_edges + 2}) / kKinds;
     return layers * pixels * 2 * (3 * sizeof(int64_t) + sizeof(SplatBuffer::Sum));
 }
 
@@ -117,7 +119,7 @@ void TechniqueImages::add_saved(SectionReader& from) {
     for (uint64_t i = 0; i < count; ++i) {
         const auto strategy = from.get<uint32_t>();
         const auto s = from.get<int>(), t = from.get<int>();
-        const bool is_one = strategy <= uint32_t(Strategy::Gather) && s >= 0 && t >= 0 &&
+        const bool is_one = strategy <= uint32_t(Strategy::Specular) && s >= 0 && t >= 0 &&
                             s <= max_edges_ + 2 && t <= max_edges_ + 2;
         const Technique q{is_one ? Strategy(strategy) : Strategy::Hit, s, t};
         Layer* const l = is_one && q.vertices() >= 2 && s <= q.vertices() ? layer(q) : nullptr;

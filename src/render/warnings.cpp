@@ -4,7 +4,8 @@
 
 #include <fmt/format.h>
 
-#include "system/available_memory.h"
+#include "render/renderer.h"
+#include "reuse/light_vertex_cache.h"
 
 namespace etendue {
 
@@ -31,8 +32,8 @@ std::vector<std::string> memory_warnings(const Scene& scene, const std::string& 
                                          std::optional<uint64_t> available) {
     const uint64_t allowed = integrator.light_path_memory();
     if (allowed == 0 || !available) return {};
-    // About what a pass stores for a light path of a closed room.
-    constexpr uint64_t kBytesPerPath = 24 * 68;
+    // About what a pass needs for a light path of a closed room.
+    constexpr uint64_t kBytesPerPath = 24 * LightVertexCache::kVertexBytes;
     const uint64_t paths = std::max(light_paths, scene.film().pixel_count());
     const uint64_t need = std::min(allowed, paths * kBytesPerPath);
     if (need <= *available) return {};
@@ -40,6 +41,12 @@ std::vector<std::string> memory_warnings(const Scene& scene, const std::string& 
     return {fmt::format("{} may need up to {} for its light paths, but only {} of memory are free; "
                         "memory={} limits it, and there are fewer light paths then",
                         name, format_bytes(need), format_bytes(*available), fitting)};
+}
+
+std::vector<std::string> memory_warnings(const Renderer& renderer,
+                                         std::optional<uint64_t> available) {
+    return memory_warnings(renderer.scene(), renderer.settings().integrator.name,
+                           renderer.integrator(), renderer.light_paths(), available);
 }
 
 }  // namespace etendue

@@ -8,6 +8,7 @@
 
 #include "integrator/integrator.h"
 #include "pathspace/render_stats.h"
+#include "system/available_memory.h"
 
 namespace etendue {
 
@@ -19,5 +20,8 @@ std::vector<std::string> warnings(const RenderStats& stats);
 std::vector<std::string> memory_warnings(const Scene& scene, const std::string& name,
                                          const Integrator& integrator, uint64_t light_paths,
                                          std::optional<uint64_t> available);
+class Renderer;
+std::vector<std::string> memory_warnings(const Renderer& renderer,
+                                         std::optional<uint64_t> available = available_memory());
 
 }  // namespace etendue

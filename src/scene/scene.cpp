@@ -99,6 +99,49 @@ SurfaceGeometry Scene::surface(const SurfaceLocation& at) const {
     return g;
 }
 
+std::optional<SurfaceJet> Scene::jet(const SurfaceLocation& at, Vec3d o, Vec3d d,
+                                     double near) const {
+    const Shape& shape = *shapes_[at.shape].shape;
+    if (at.instance == kNoInstance) return shape.jet(at.prim, o, d, near);
+    const Transform& t = owned_->accelerator.instance(at.instance).to_world;
+    const auto mapped = [](const Transform::Matrix& m, Vec3d v, double w) -> Vec3d {
+        return {m[0][0] * v.x + m[0][1] * v.y + m[0][2] * v.z + w * m[0][3],
+                m[1][0] * v.x + m[1][1] * v.y + m[1][2] * v.z + w * m[1][3],
+                m[2][0] * v.x + m[2][1] * v.y + m[2][2] * v.z + w * m[2][3]};
+    };
+    const auto mapped_normal = [&](Vec3d n) -> Vec3d {
+        const Transform::Matrix& m = t.inverse_matrix();
+        return {m[0][0] * n.x + m[1][0] * n.y + m[2][0] * n.z,
+                m[0][1] * n.x + m[1][1] * n.y + m[2][1] * n.z,
+                m[0][2] * n.x + m[1][2] * n.y + m[2][2] * n.z};
+    };
+    // The parameter t of the line is the same in the space of the instance.
+    std::optional<SurfaceJet> j = shape.jet(at.prim, mapped(t.inverse_matrix(), o, 1),
+                                            mapped(t.inverse_matrix(), d, 0), near);
+    if (!j) return {};
+    j->p = mapped(t.matrix(), j->p, 1);
+    j->dpdu = mapped(t.matrix(), j->dpdu, 0);
+    j->dpdv = mapped(t.matrix(), j->dpdv, 0);
+    j->ng = normalize(mapped_normal(j->ng));
+    const Vec3d n = mapped_normal(j->ns);
+    const double size = length(n);
+    j->ns = n / size;
+    for (Vec3d* dn : {&j->dnsdu, &j->dnsdv}) {
+        const Vec3d v = mapped_normal(*dn);
+        *dn = (v - j->ns * dot(j->ns, v)) / size;
+    }
+    return j;
+}
+
+Vec3 Scene::point_on(const ClearShape& clear, float u_prim, Vec2 u) const {
+    const size_t n = clear.shape->primitive_count(),
+                 prim = std::min(size_t(double(u_prim) * double(n)), n - 1);
+    const Vec3 p = clear.shape->sample(uint32_t(prim), u).p;
+    return clear.instance == kNoInstance
+               ? p
+               : owned_->accelerator.instance(clear.instance).to_world.point(p);
+}
+
 float Scene::opacity(const SurfaceLocation& at) const {
     return opacity_of(shapes_[at.shape], surface(at));
 }
@@ -120,23 +163,30 @@ void Scene::complete(SurfaceHit& hit) const {
 }
 
 template <class Stops, class Passes>
-Ray Scene::for_each_surface(Ray ray, const Stops& stops, const Passes& passes) const {
+float Scene::for_each_surface(Ray ray, const Stops& stops, const Passes& passes) const {
+    const bool is_segment = ray.tmax < kInf;
+    const Vec3 end = is_segment ? ray.o + ray.d * ray.tmax : Vec3();
     SurfaceHit hit;
-    const float length_d = length(ray.d);
+    float length_d = length(ray.d);
     float skipped =
         0;  // distance from the last surface to the ray's origin, which is offset from it
+    const auto rest = [&] { return ray.tmax * length_d + skipped; };
     while (ray.tmax > 0 && locate(ray, hit)) {
         hit.t = hit.t * length_d + skipped;
-        if (stops(hit)) return ray;
+        if (stops(hit)) return rest();
         complete(hit);
-        if (!passes(hit)) return ray;
+        if (!passes(hit)) return rest();
         const Vec3 p = hit.geometry.p, o = offset_origin(ray_end(hit.geometry), ray.d);
         skipped = dot(o - p, ray.d) / length_d;
-        ray.tmax -= dot(o - ray.o, ray.d) / sqr(length_d);
         ray.o = o;
+        if (!is_segment) continue;
+        // The offsets are aside of the ray. Its end lies so near to a surface that it must stay where it is.
+        const Vec3 to_end = end - o;
+        ray.tmax = dot(to_end, ray.d) > 0 ? 1.0f : 0.0f;
+        ray.d = to_end;
+        length_d = length(to_end);
     }
-    ray.tmax += skipped / length_d;
-    return ray;
+    return rest();
 }
 
 bool Scene::intersect(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const {
@@ -210,7 +260,7 @@ float Scene::masked_transmittance(const Ray& ray) const {
 
 Rgb Scene::attenuation(MediumId medium, const Ray& ray) const {
     Rgb product(1);
-    const Ray rest = for_each_surface(
+    const float rest = for_each_surface(
         ray,
         [&](const SurfaceHit& hit) {
             product *= attenuation(medium, hit.t);
@@ -220,7 +270,7 @@ Rgb Scene::attenuation(MediumId medium, const Ray& ray) const {
             medium = medium_beyond(hit, ray.d, medium);
             return true;
         });
-    return product * attenuation(medium, std::max(0.0f, rest.tmax) * length(ray.d));
+    return product * attenuation(medium, std::max(0.0f, rest));
 }
 
 /// A shadow ray from `a` to `b` with parameters in [0, 1]; both ends are moved off their surfaces.

@@ -58,15 +58,16 @@ private:
     /// stays, unless it was dropped.
     std::vector<ReplayedPath::Point> points(const Join& join) const {
         int s = join.technique.s, t = join.technique.t;
-        const SubPath& y = is_pair(join.technique.strategy) ? work_.pair : work_.y;
+        const SubPath& y = work_.light_side(join.technique);
+        const bool is_joined = join.technique.strategy != Strategy::Merge &&
+                               join.technique.strategy != Strategy::Specular;
         if (is_pair(join.technique.strategy)) --(join.technique.drops_eye ? t : s);
         std::vector<ReplayedPath::Point> list;
         if (join.technique.strategy == Strategy::NextEvent)
             list.push_back({join.b.p, 'L', join.to_infinity});
         else
             for (int i = 0; i < std::min(s, y.size()); ++i)
-                list.push_back(
-                    point(y[i], i == s - 1 && join.technique.strategy != Strategy::Merge));
+                list.push_back(point(y[i], i == s - 1 && is_joined));
         if (t == 1)
             list.push_back({join.a.p, 'E', false});
         else

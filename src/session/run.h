@@ -24,6 +24,8 @@ struct Session::Run : std::enable_shared_from_this<Session::Run> {
         own_version;     ///< Its file in the folder of runs, and that which it wrote.
     int file_seeds = 0;  ///< The seeds that are finished in the file.
     std::shared_future<void> file_written;  ///< Of the last one that was begun.
+    bool is_choosing =
+        false;  ///< Whether pilots choose its method, which have no result of their own.
 
     SharedSlot<const Snapshot> snapshot;
     SharedSlot<const TechniqueSnapshot> techniques;

@@ -24,15 +24,14 @@ struct GridSize {
     size_t triangles() const { return size_t(2) * size_t(columns) * size_t(rows); }
 };
 
-/// All other shapes than meshes have parameters (u, v) in [0, 1]².
-Mesh grid_of(const Shape& shape, GridSize size) {
+Mesh grid_of(const AnalyticShape& shape, GridSize size) {
     Mesh mesh;
     for (int row = 0; row <= size.rows; ++row)
-        for (int column = 0; column <= size.columns; ++column)
-            mesh.positions.push_back(shape
-                                         .surface(0, float(column) / float(size.columns),
-                                                  float(row) / float(size.rows), false)
-                                         .p);
+        for (int column = 0; column <= size.columns; ++column) {
+            const Vec2 at = shape.grid_parameters(
+                {float(column) / float(size.columns), float(row) / float(size.rows)});
+            mesh.positions.push_back(shape.surface(0, at.x, at.y, false).p);
+        }
     for (int row = 0; row < size.rows; ++row)
         for (int column = 0; column < size.columns; ++column) {
             const auto a = uint32_t(row * (size.columns + 1) + column), b = a + 1,
@@ -186,7 +185,8 @@ std::vector<DrawnShape> drawn_shapes(const Scene& scene, size_t most_triangles) 
         grid = {grid.columns / 2, grid.rows / 2};
     for (size_t i = 0; i < parts.size(); ++i)
         if (!parts[i].given && !places[i].empty())
-            parts[i].own = grid_of(*scene.shapes()[i].shape, grid);
+            parts[i].own =
+                grid_of(dynamic_cast<const AnalyticShape&>(*scene.shapes()[i].shape), grid);
 
     const auto has_too_many = [&](size_t most) {
         size_t triangles = 0, drawn = 0;

@@ -14,6 +14,7 @@
 #include "render/method_choice.h"
 #include "render/render_report.h"
 #include "render/render_request.h"
+#include "render/warnings.h"
 #include "session/run.h"
 #include "system/failure.h"
 #include "system/memory_limit.h"
@@ -244,7 +245,15 @@ void Session::make_renderer(Run& run) {
     std::unique_ptr<Integrator> integrator = std::move(run.integrator);
     if (is_auto(run.settings.integrator)) integrator = chosen_method(run);
     if (!integrator) integrator = make_integrator(run.settings.integrator);
-    run.renderer = std::make_unique<Renderer>(run.scene(), run.settings, std::move(integrator));
+    RenderSettings own = run.settings;
+    // The pilots of a series are part of the time of its first seed.
+    if (run.seeds.count() > 0) own.choice = nullptr;
+    run.renderer = std::make_unique<Renderer>(run.scene(), own, std::move(integrator));
+    {
+        std::vector<std::string> warnings = memory_warnings(*run.renderer);
+        const std::lock_guard lock(mutex_);
+        run.status.warnings = std::move(warnings);
+    }
     run.log = {};
     if (!folder_) return;
     run.conditions = conditions_of(*run.renderer, run.scene(), run.loaded->source, run.settings);
@@ -252,9 +261,15 @@ void Session::make_renderer(Run& run) {
 }
 
 std::unique_ptr<Integrator> Session::chosen_method(Run& run) {
-    run.settings = with_chosen_method(run.scene(), run.settings);
+    {
+        const std::lock_guard lock(mutex_);
+        if (run.status.state != RunState::Rendering) throw PassDropped();
+        run.is_choosing = true;
+    }
+    run.settings = with_chosen_method(run.scene(), run.settings, drop_);
     std::unique_ptr<Integrator> integrator = make_integrator(run.settings.integrator);
     const std::lock_guard lock(mutex_);
+    run.is_choosing = false;
     RunStatus& s = run.status;
     s.request.integrator = run.settings.choice->chosen;
     s.choice = run.settings.choice;
@@ -268,7 +283,11 @@ void Session::take_turn(Run& run) {
     run.last_turn = ++turns_;
     const auto begin = Clock::now();
     guard(run, [&] {
-        if (!run.renderer || run.is_counted) make_renderer(run);
+        try {
+            if (!run.renderer || run.is_counted) make_renderer(run);
+        } catch (const PassDropped&) {
+            return finish_turn(run, RunState::Rendering);  // It was stopped while pilots rendered.
+        }
         const StopReason reason = run.renderer->run(
             run.settings,
             [&](const Progress& progress) {
@@ -331,6 +350,7 @@ void Session::request_stop(const std::shared_ptr<Run>& run) {
     commands_.push_back([this, run] { finish_stop(*run); });
     run->status.state = RunState::Stopping;
     changed();
+    if (run->is_choosing && turn_of_ == run->status.id) drop_ = true;
     turn_over_ = true;
     wake_.notify_all();
 }

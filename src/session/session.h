@@ -70,6 +70,7 @@ struct RunStatus {
     Estimator estimator = Estimator::Unbiased;
     IntervalKind interval = IntervalKind::Confidence;
     std::shared_ptr<const MethodChoice> choice;  ///< Where `auto` has chosen the method.
+    std::vector<std::string> warnings;           ///< Of the memory that the passes need.
     std::vector<std::pair<std::string, double>> figures;
     std::vector<ConvergencePoint> history;  ///< Points that are about equally spaced in log time.
     bool is_of_this_scene = true;           ///< False after the scene was loaded again.

@@ -26,6 +26,7 @@ const char* name_of(Strategy strategy) {
     case Strategy::HitLens: return "hit lens";
     case Strategy::Merge: return "merge";
     case Strategy::Gather: return "gather";
+    case Strategy::Specular: return "specular";
     }
     return "";
 }
@@ -89,10 +90,11 @@ json to_json(const RunStatus& s) {
     json j = progress_of(s);
     j["integrator"] = s.request.integrator;
     if (s.choice) {
-        j["auto"] = json::parse(s.choice->to_json().dump());
+        j["auto"] = json::parse(s.choice->to_text());
         j["auto"]["message"] = s.choice->message();
     }
     j["why_look_only"] = s.why_look_only;
+    j["warnings"] = s.warnings;
     j["sampler"] = to_string(s.request.sampler);
     j["filter_mode"] = to_string(s.request.filter_mode);
     j["seed"] = s.request.seed;

@@ -166,7 +166,8 @@ TechniqueReport compare_technique(const Technique& q, const Sides& sides,
     /// Index of the reference of a class; empty where the technique cannot make the class.
     const auto reference_of = [&](const PathClass& c) -> std::optional<size_t> {
         const CommonClasses::Class* k = sides.common.find(c);
-        if (!k || !k->is_reachable || c.has_short_edge || !can_make(q, c)) return {};
+        if (!k || !k->is_reachable || c.has_short_edge || !can_make(sides.method.counts, q, c))
+            return {};
         return k->reference;
     };
 

@@ -9,8 +9,7 @@ void ContributionTally::observe(const Join& join, Rgb contribution, float share,
     const size_t edges = size_t(join.technique.vertices() - 1);
     if (edges >= cut_offs_.size()) return;
     const Technique& q = join.technique;
-    const SubPath& y = is_pair(q.strategy) ? paths.pair : paths.y;
-    const PathClass c = classify(scene_, join, y, paths.z, cut_offs_[edges]);
+    const PathClass c = classify(scene_, join, paths.light_side(q), paths.z, cut_offs_[edges]);
     Sums& sums = sums_[uint64_t(q.strategy) << 40 | uint64_t(q.s) << 32 | c.key()];
     if (!sums.tiles) {
         sums.tiles = &tiles_[c.without_length_of_edges()];

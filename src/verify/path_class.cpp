@@ -38,8 +38,9 @@ PathClass classify(const Scene& scene, const Join& join, const SubPath& y, const
                 .delta_emitter = join.emitter->is_delta(),
                 .infinite_ends = join.emitter->is_infinite() && scene.sensor().is_orthographic()};
     // At the end points of a join the path scatters by a smooth lobe, whatever event the walk sampled there. C(s,0) has
-    // no such end point.
-    for (int i = 1; i < (q.t == 0 ? last : q.s - 1); ++i)
+    // no such end point, and the light vertex of X(s,t) is a delta event.
+    const int light = q.t == 0 ? last : q.strategy == Strategy::Specular ? q.s : q.s - 1;
+    for (int i = 1; i < light; ++i)
         if (y[i].is_delta) c.delta_events |= 1u << i;
     for (int i = 1; i < q.t - 1; ++i)
         if (z[i].is_delta) c.delta_events |= 1u << (last - i);
@@ -52,6 +53,7 @@ std::vector<Technique> techniques_of_length(int edges) {
     if (edges >= 2) out.push_back({Strategy::Connect, 1, edges});
     for (const Strategy strategy : {Strategy::Merge, Strategy::Gather})
         for (int s = 2; s <= edges; ++s) out.push_back({strategy, s, edges + 2 - s});
+    for (int s = 2; s < edges; ++s) out.push_back({Strategy::Specular, s, edges + 1 - s});
     return out;
 }
 
@@ -83,6 +85,9 @@ bool can_make(const Technique& q, const PathClass& c) {
     // A gather samples the vertex again from one of the two sides.
     if (q.strategy == Strategy::Gather) return !((fixed & x_m << 1) && (fixed & x_m >> 1));
     if (q.strategy == Strategy::Hit) return !c.delta_emitter;
+    // All of x_1 … x_{s-1} are delta events, and x_s is none.
+    if (q.strategy == Strategy::Specular)
+        return q.s >= 2 && q.t >= 2 && (c.delta_events & ((x_m << 2) - 1)) == (x_m << 1) - 2;
     if (q.strategy == Strategy::HitLens) return true;
     if (q.s == 1 && q.t == 1) return !c.infinite_ends;
     return (c.delta_events & (x_m | x_m << 1)) == 0;  // x_{s-1} and x_s are connected
@@ -94,9 +99,22 @@ std::string to_string(const PathClass& c) {
     return text + "E";
 }
 
+bool can_make(const TechniqueCounts& counts, const Technique& q, const PathClass& c) {
+    if (!(counts.of(q) > 0) || !can_make(q, c)) return false;
+    if (q.strategy != Strategy::Specular) return true;
+    // It is used where nothing but hits makes the path.
+    if (counts.uses_pairs()) return false;
+    for (int i = q.s; i < c.edges; ++i) {
+        const bool is_lens = i + 1 == c.edges;
+        const bool is_split = (c.delta_events & (3u << i)) == 0;
+        if (is_split && (is_lens ? counts.splat : counts.connect) > 0) return false;
+    }
+    return true;
+}
+
 bool can_make(const TechniqueCounts& counts, const PathClass& c) {
     for (const Technique& q : techniques_of_length(c.edges))
-        if (counts.of(q) > 0 && can_make(q, c)) return true;
+        if (can_make(counts, q, c)) return true;
     return false;
 }
 

@@ -56,6 +56,8 @@ bool can_make(const Technique& technique, const PathClass& c);
 /// Number of times that `technique` makes each path of a class that it can make: 2 for gathers under PairRule::Both
 /// where either vertex can be dropped, otherwise 1.
 int times_made(const Technique& technique, const PathClass& c, PairRule rule);
+/// The same where the technique is one of a method with these counts, which may leave classes to other techniques.
+bool can_make(const TechniqueCounts& counts, const Technique& technique, const PathClass& c);
 /// Whether any technique with a positive count can make paths of the class.
 bool can_make(const TechniqueCounts& counts, const PathClass& c);
 

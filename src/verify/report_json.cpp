@@ -72,6 +72,7 @@ nlohmann::ordered_json to_json(const VerifyReport& report, const MethodReport& m
         j["techniques"].push_back(to_json(report, t.comparison));
         j["techniques"].back().update(
             nlohmann::ordered_json{{"is_pair", is_pair(t.technique.strategy)},
+                                   {"is_specular", t.technique.strategy == Strategy::Specular},
                                    {"s", t.technique.s},
                                    {"t", t.technique.t},
                                    {"coverage", t.coverage}});

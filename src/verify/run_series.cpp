@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "math/hash.h"
+#include "render/warnings.h"
 #include "system/threads.h"
 #include "verify/verify.h"
 
@@ -36,7 +37,7 @@ public:
     void observe(const Join& join, Rgb contribution, float share, const FilmTarget&,
                  const Workspace& paths) override {
         const Technique& q = join.technique;
-        const SubPath& y = is_pair(q.strategy) ? paths.pair : paths.y;
+        const SubPath& y = paths.light_side(q);
         lengths_[size_t(q.vertices() - 1)].emplace_back(
             shortest_edge(scene_, join, y, paths.z),
             double(luminance(contribution) * join.mis_weight * share));
@@ -223,6 +224,10 @@ RunSeries SeriesRenderer::begin(const IntegratorSpec& spec, uint64_t stream,
     series.estimator = integrator->estimator();
     series.has_chains = integrator->error_groups() > 0;
     series.runs.resize(size_t(options_.runs));
+    // Each thread has a rendering of its own.
+    if (const std::optional<uint64_t> available = available_memory())
+        series.memory_warnings = memory_warnings(scene_, spec.name, *integrator, light_paths,
+                                                 *available / uint64_t(threads(spec)));
     if (spp) {
         series.spp = *spp;
     } else {

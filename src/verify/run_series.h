@@ -44,6 +44,7 @@ struct RunSeries {
     uint64_t spp = 0;         ///< Samples per pixel of one rendering.
     uint64_t renderings = 0;  ///< Renderings per run.
     double seconds = 0;       ///< Wall-clock time of all renderings.
+    std::vector<std::string> memory_warnings;  ///< See render/warnings.h.
     std::vector<IndependentRun> runs;
 
     uint64_t samples() const { return spp * renderings; }  ///< Samples per pixel of one run.

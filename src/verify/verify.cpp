@@ -64,7 +64,9 @@ MethodReport start_report(const IntegratorSpec& spec, const RunSeries& series) {
 }
 
 void add_warnings(const RunSeries& series, VerifyReport& report) {
-    for (const std::string& w : warnings(series.stats()))
+    std::vector<std::string> texts = warnings(series.stats());
+    texts.insert(texts.end(), series.memory_warnings.begin(), series.memory_warnings.end());
+    for (const std::string& w : texts)
         report.warnings.push_back(fmt::format("{}: {}", series.spec.to_string(), w));
 }
 

@@ -78,3 +78,16 @@ def test_a_choice_is_kept_in_checkpoints(cornell: et.Scene, tmp_path: Path) -> N
     first.save(tmp_path / "a.etd")
     resumed = et.resume(tmp_path / "a.etd", cornell, spp=130, progress=False)
     assert resumed.stats["auto"] == first.stats["auto"]
+
+
+def test_a_rendering_that_goes_on_does_not_choose_again(scenes: Path, tmp_path: Path) -> None:
+    scene = et.load(scenes / "cornell.xml").build(resolution=(64, 64))
+    first = et.render(scene, "auto:chains=false", spp=4000, callback=lambda p: p.passes < 3, progress=False)
+    assert first.stats["auto"]["pilots"] > 0
+    first.save(tmp_path / "a.etd")
+    # For so short a rendering, there would be no pilots.
+    for integrator in "auto:chains=false", None:
+        resumed = et.resume(tmp_path / "a.etd", scene, integrator, spp=first.passes + 1, progress=False)  # type: ignore[arg-type]
+        assert resumed.stats["auto"] == first.stats["auto"] and resumed.stats["integrator"] == first.stats["integrator"]
+    with pytest.raises(RuntimeError, match="chains=false"):
+        et.resume(tmp_path / "a.etd", scene, "auto", spp=10, progress=False)  # type: ignore[arg-type]

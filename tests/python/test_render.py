@@ -319,7 +319,7 @@ CHILD = """
     scene = d.build(resolution={size})
     print("ready", flush=True)
     try:
-        result = et.render(scene, "bdpt", time=600, callback={callback})
+        result = et.render(scene, "{method}", time=600, callback={callback})
     except KeyboardInterrupt:
         print("raised", flush=True)
     else:
@@ -327,8 +327,9 @@ CHILD = """
 """
 
 
-def interrupt(scene: str, size: tuple[int, int], wait: float, callback: str = "None") -> tuple[str, float]:
-    code = textwrap.dedent(CHILD.format(scene=scene, size=size, callback=callback))
+def interrupt(scene: str, size: tuple[int, int], wait: float, callback: str = "None",
+              method: str = "bdpt") -> tuple[str, float]:
+    code = textwrap.dedent(CHILD.format(scene=scene, size=size, callback=callback, method=method))
     # A process that was started in the background ignores interrupts, and its children do.
     child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True,
                              preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
@@ -350,6 +351,11 @@ def test_interrupts_return_what_there_is(scenes: Path, callback: str) -> None:
 def test_interrupts_before_the_first_pass_raise(scenes: Path) -> None:
     out, seconds = interrupt(str(scenes / "cornell.xml"), (4000, 4000), 0.5)
     assert out == "raised" and seconds < 30
+
+
+def test_interrupts_of_pilots_raise(scenes: Path) -> None:
+    out, seconds = interrupt(str(scenes / "cornell.xml"), (400, 400), 1, method="auto")
+    assert out == "raised" and seconds < 5
 
 
 @pytest.mark.long

@@ -13,11 +13,18 @@ namespace {
 constexpr float kDegree = kPi / 180;
 constexpr LogRange kTurns{1e-3f * kDegree, 0.1f * kDegree};
 
+/// Direction of the ray from a surface that meets another vertex. It begins beside the surface, by more than the smallest
+/// angles where coordinates are large.
+Vec3 aim(const Vertex& from, const Vertex& to) {
+    const Vec3 d = direction(from, to);
+    return to.is_infinite ? d : normalize(to.p - offset_origin(from.ray_end(), d));
+}
+
 /// Density of y_{i-1} from y_i, if the direction to x_{i-1} was turned by an angle whose logarithm is uniform; up to a
 /// constant.
 double turned_density(const PathState& x, const PathState& y, int i) {
     const Vertex& at = y[i].v;
-    const Vec3 difference = direction(at, y[i - 1].v) - direction(at, x[i - 1].v);
+    const Vec3 difference = aim(at, y[i - 1].v) - aim(at, x[i - 1].v);
     const float angle = 2 * std::asin(std::min(0.5f * length(difference), 1.0f));
     if (!kTurns.contains(angle)) return 0;
     return y.geometry_from_eye(i - 1) / double(angle * std::sin(angle));
@@ -75,7 +82,7 @@ bool EyeChainMutation::propose(const PathState& x, const MutationContext& c, Pat
             c.sampler.seek(Stream::Selection, addresses::kTurn + uint64_t(i));
             const float angle = kTurns.sample(c.sampler.next_1d());
             // Toward the old vertex: the old direction would miss it by as much as x_i moves.
-            s = given(turned(direction(at, x[i - 1].v), angle, c.sampler.next_1d()));
+            s = given(turned(aim(at, x[i - 1].v), angle, c.sampler.next_1d()));
         }
         if (!s || !builder.step_eye(*s)) return false;
     }

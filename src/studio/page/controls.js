@@ -101,7 +101,7 @@ export class RunList {
             const name = ` ${run.id}: ${run.integrator}`;
             if (row.name.textContent !== name) row.name.textContent = name;
             if (run.auto && row.choice.hidden) showChoice(row.choice, run.auto);
-            const text = `${run.state}: ${describe(run)}${run.old_scene ? ' (earlier version of the scene)' : ''}${run.message ? `: ${run.message}` : ''}${describeFile(run)}`;
+            const text = `${run.state}: ${describe(run)}${run.old_scene ? ' (earlier version of the scene)' : ''}${run.message ? `: ${run.message}` : ''}${run.warnings.map((/** @type {string} */ w) => `; ${w}`).join('')}${describeFile(run)}`;
             if (row.figures.textContent !== text) row.figures.textContent = text;
             row.figures.classList.toggle('error', run.state === 'failed' || Boolean(run.file_problem));
             row.toggle.disabled = Boolean(run.why_look_only);

@@ -4,11 +4,13 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <set>
 
 #include <gtest/gtest.h>
 
 #include "image/image_io.h"
 #include "random.h"
+#include "render/method_choice.h"
 #include "run_program.h"
 #include "test_scenes.h"
 
@@ -265,6 +267,34 @@ TEST(MeanRatio, IntervalHoldsOneForAnUnbiasedMethod) {
     EXPECT_LE(m.mean_ratio.low, 1);
     EXPECT_GE(m.mean_ratio.high, 1);
     EXPECT_LT(m.mean_ratio.high - m.mean_ratio.low, 0.2);
+}
+
+/// They are rendered in less time, for which `auto` would choose without pilots.
+TEST(Compare, TechniqueImagesOfAutoAreThoseOfTheMethodThatItChose) {
+    const Scene scene = build(front_camera(24) + room() + area_lamp());
+    CompareSettings settings = settings_of({"auto:chains=false,max_depth=3"}, 1);
+    settings.limits = {.spp = {}, .seconds = 0.5, .error = {}};
+    settings.technique_depth = 4;
+    const Comparison c = compare(
+        scene, white_reference(scene), settings, [](const std::string&) {}, kNotInterrupted);
+    ASSERT_EQ(c.failures.size(), 0u);
+    const Method& m = c.methods.front();
+    ASSERT_TRUE(m.choice);
+    const auto techniques = [](const std::vector<TechniqueImages::Entry>& images) {
+        std::set<std::pair<int, int>> all;
+        for (const auto& e : images) all.insert({e.technique.s, e.technique.t});
+        return all;
+    };
+    RenderSettings own;
+    own.integrator = IntegratorSpec::parse(m.choice->chosen);
+    own.technique_depth = 4;
+    own.spp = m.technique_spp;
+    own.sampler = settings.sampler;
+    Renderer given(scene, own);
+    given.run([](const Progress&) {}, kNotInterrupted);
+    EXPECT_EQ(techniques(m.techniques), techniques(given.techniques()->images()))
+        << m.choice->chosen;
+    EXPECT_GT(m.choice->candidates.front().images, 0);
 }
 
 }  // namespace

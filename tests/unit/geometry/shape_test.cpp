@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "geometry/accelerator.h"
+#include "math/frame.h"
 #include "random.h"
 
 namespace etendue {
@@ -121,29 +122,52 @@ TEST(AnalyticShapes, ParametersOfHits) {
         }
 }
 
-// Near the origin of the world, points of large spheres are those that the ray met, whatever side faces the origin.
-TEST(Sphere, HitsOfLargeSpheresStayInPlace) {
+/// Expects that points of a shape through the origin are those that rays meet there.
+void expect_hits_stay_in_place(const AnalyticShape& shape, Vec3 side) {
     testing::Random random(5);
+    Accelerator accelerator;
+    accelerator.add_shape(shape);
+    accelerator.commit();
+    int hits = 0;
+    for (int i = 0; i < 1000; ++i) {
+        const Vec3 o = side * 50.0f + random.in_cube() * 30;
+        const Ray ray{o, normalize(random.in_cube() * 40 - o), kInf};
+        RayHit hit;
+        if (!accelerator.intersect(ray, hit)) continue;
+        ++hits;
+        const Vec3 p = shape.surface(0, hit.u, hit.v, false).p;
+        // Of the parameters, and of the ray's own distance.
+        EXPECT_LT(length(p - (ray.o + ray.d * hit.t)), 2e-6f * (length(p) + hit.t));
+    }
+    EXPECT_GT(hits, 300);
+}
+
+// However large a shape is, and whatever side of it faces the origin.
+TEST(AnalyticShapes, HitsOfLargeShapesStayInPlace) {
     const Vec3 sides[] = {{0, 0, 1}, {0, 0, -1}, {1, 0, 0},           {-1, 0, 0},
                           {0, 1, 0}, {0, -1, 0}, {0.48f, 0.6f, 0.64f}};
-    for (const float radius : {1e5f, 6.4e6f})
+    for (const float size : {1e5f, 6.4e6f})
         for (const Vec3 side : sides) {
-            const Sphere sphere(side * radius * -1.0f, radius, false);  // through the origin
-            Accelerator accelerator;
-            accelerator.add_shape(sphere);
-            accelerator.commit();
-            int hits = 0;
-            for (int i = 0; i < 1000; ++i) {
-                const Vec3 o = side * 50.0f + random.in_cube() * 30;
-                const Ray ray{o, normalize(random.in_cube() * 40 - o), kInf};
-                RayHit hit;
-                if (!accelerator.intersect(ray, hit)) continue;
-                ++hits;
-                const Vec3 p = sphere.surface(0, hit.u, hit.v, false).p;
-                // Of the parameters, which are angles about the origin, and of the ray's own distance.
-                EXPECT_LT(length(p - (ray.o + ray.d * hit.t)), 2e-6f * (length(p) + hit.t));
-            }
-            EXPECT_GT(hits, 300);
+            expect_hits_stay_in_place(Sphere(side * size * -1.0f, size, false), side);
+            const Frame frame = Frame::from_normal(side);
+            // Discs that face the side, with the origin halfway to their rim.
+            const Vec3 center = frame.s * (-0.5f * size);
+            const Transform::Matrix disc = {{
+                {frame.s.x * size, frame.t.x * size, side.x, center.x},
+                {frame.s.y * size, frame.t.y * size, side.y, center.y},
+                {frame.s.z * size, frame.t.z * size, side.z, center.z},
+                {0, 0, 0, 1},
+            }};
+            expect_hits_stay_in_place(Disk(Transform(disc), false), side);
+            // Cylinders along t, which end at the same distance on both sides.
+            const Vec3 low = side * -size - frame.t * size;
+            const Transform::Matrix cylinder = {{
+                {side.x * size, frame.s.x * size, frame.t.x * 2 * size, low.x},
+                {side.y * size, frame.s.y * size, frame.t.y * 2 * size, low.y},
+                {side.z * size, frame.s.z * size, frame.t.z * 2 * size, low.z},
+                {0, 0, 0, 1},
+            }};
+            expect_hits_stay_in_place(Cylinder(Transform(cylinder), false), side);
         }
 }
 

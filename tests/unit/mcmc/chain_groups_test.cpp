@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "error_of.h"
 #include "math/statistics.h"
 #include "mcmc/pilot.h"
 #include "toy.h"
@@ -88,19 +89,57 @@ TEST(ChainGroups, GenerationsAreUnbiased) {
             0.015);
 }
 
+/// Its chains cannot leave their state by small steps.
+class StayingSpace final : public PrimarySpace {
+public:
+    using PrimarySpace::PrimarySpace;
+    Proposal propose(int, const ChainState&, uint64_t, const ChainContext&,
+                     ChainState& y) const override {
+        y.target = 0;
+        y.splats.clear();
+        return {.has_failed = true};
+    }
+};
+
+/// A pool that is thinned out before chains start has, in the mean, all of its samples, whatever their numbers are.
+TEST(ChainGroups, ThinningDoesNotDependOnTheSamples) {
+    ToyPasses toy;
+    const auto sample = [](int, const SampleContext& c, Workspace& work) {
+        work.z.film_weight = 1;
+        c.sampler.seek(Stream::Eye, 0);
+        const int cell = std::min(int(c.sampler.next_1d() * kCells), kCells - 1);
+        c.sink.add({.technique = {Strategy::Splat, 3, 1},
+                    .emitter = nullptr,
+                    .contribution = Rgb(1),
+                    .mis_weight = 1,
+                    .film = {float(cell) + 0.5f, 0.5f}},
+                   Rgb(1));
+    };
+    const StayingSpace space(1, sample, TargetMap(toy.geometry()));
+    std::array<Moments, kCells> means;
+    for (uint64_t run = 0; run < 20000; ++run) {
+        ChainGroups groups(space, {.groups = 1, .chains = 16, .p_large = 0.01, .pool = 64},
+                           {{.chains = 16, .c = 0}});
+        CellSums sums;
+        groups.advance(toy.pass(0, hash_combine(27, run), 32, sums));
+        groups.commit();
+        for (size_t k = 0; k < kCells; ++k) means[k].add(sums.sums[k]);
+    }
+    for (size_t k = 0; k < kCells; ++k)
+        EXPECT_NEAR(means[k].mean(), 1.0 / kCells, 4 * std::sqrt(means[k].squared_error())) << k;
+}
+
+/// Chains that make many large steps keep few of what they find, with the same means.
+TEST(ChainGroups, ManyFindsOfAPassAreThinnedOut) {
+    expect_exact(
+        run_toy(
+            {{.groups = 2, .chains = 4, .p_large = 0.5, .large_step = 0.5}, 16, 10, 1600, 1000}),
+        0.005);
+}
+
 /// A group whose chains cannot leave their cell knows of the bright one by its finds alone: after many turns it has its
 /// share of the chains. Where groups start once, it has that of the first pool.
 TEST(ChainGroups, GenerationsStartFromAllFinds) {
-    class StayingSpace final : public PrimarySpace {
-    public:
-        using PrimarySpace::PrimarySpace;
-        Proposal propose(int, const ChainState&, uint64_t, const ChainContext&,
-                         ChainState& y) const override {
-            y.target = 0;
-            y.splats.clear();
-            return {.has_failed = true};
-        }
-    };
     ToyPasses toy;
     const StayingSpace space(1, toy_sample, TargetMap(toy.geometry()));
     const auto variance = [&](Starts starts) {
@@ -150,6 +189,43 @@ TEST(ChainGroups, GoOnAfterTheyWereSaved) {
         groups->commit(), saved->commit();
         ASSERT_EQ(sums.sums, sums_of_saved.sums) << i;
     }
+}
+
+/// A damaged state says so, and is not used.
+TEST(ChainGroups, RefuseStatesOfOtherChains) {
+    ToyPasses toy;
+    const PrimarySpace space(1, toy_sample, TargetMap(toy.geometry()));
+    // What a group has, as save() writes it.
+    struct Saved {
+        uint64_t chains = 0;
+        std::vector<std::array<double, 4>> normalisation{};
+        uint32_t turns = 0;
+        std::vector<std::vector<Find>> finds{};
+    };
+    const auto error = [&](const Saved& s) {
+        LearnedState state;
+        state.put(s.chains);
+        state.put(s.normalisation);
+        state.put(s.turns);
+        state.put(uint64_t(s.finds.size()));
+        for (const auto& f : s.finds) state.put(f);
+        if (s.chains == 4)
+            for (int i = 0; i < 4; ++i) state.put(false), state.put(uint64_t(0));
+        state.put(ChainStats());
+        state.put(1.0);
+        LearnedState read(state.bytes());
+        ChainGroups groups(space, {.groups = 1, .chains = 4}, {{.chains = 4, .c = 1}});
+        return error_of([&] { groups.load(read); });
+    };
+    const std::vector<std::array<double, 4>> one(1), two(2);
+    const std::vector<Find> good{{.key = 1, .weight = 1}}, other{{.chain_class = 1, .weight = 1}};
+    EXPECT_EQ(error({}), "");
+    EXPECT_EQ(error({4, one, 1, {good}}), "");
+    for (const Saved& s :
+         {Saved{4, two, 1, {good}}, Saved{4, {}, 1, {good}}, Saved{0, one, 1, {good}},
+          Saved{4, one, 0, {good}}, Saved{4, one, 1, {}}, Saved{4, one, 1, {good, good}},
+          Saved{4, one, 1, {other}}, Saved{3, one, 1, {good}}})
+        EXPECT_NE(error(s).find("of other chains"), std::string::npos) << error(s);
 }
 
 TEST(Finds, AreThinnedOutWithTheirExpectedWeights) {

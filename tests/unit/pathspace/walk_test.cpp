@@ -69,6 +69,50 @@ TEST_F(Walks, RouletteKeepsTheExpectedThroughputOfLightPaths) {
     expect_expected_throughput<TransportMode::Importance>();
 }
 
+/// What a walk meets is visible from where it left, behind masks, and out of and into glass as well: states of chains
+/// trace the edges of walks again.
+template <TransportMode mode>
+void expect_visible_edges(const Scene& scene) {
+    const Film film{scene.film(), scene.filter()};
+    const TechniqueCounts counts{.hit = 1, .next_event = 1, .connect = 1, .splat = 64};
+    RenderStats stats;
+    const WalkContext walk{scene, counts, stats, {12, 100}};
+    SubPath path;
+    int edges = 0, hidden = 0;
+    for (uint32_t index = 0; index < 20000; ++index) {
+        Sampler sampler(SamplerKind::Independent, 3);
+        sampler.start(index, index % 64);
+        if (mode == TransportMode::Radiance)
+            trace_eye_path(walk, film, index % 64, sampler, path);
+        else
+            trace_light_path(walk, sampler, path);
+        for (int i = 2; i < path.size(); ++i) {
+            if (path[i].kind != Vertex::Kind::Surface) continue;
+            ++edges;
+            hidden += scene.transmittance(path[i - 1].ray_end(), path[i].ray_end()) == 0;
+        }
+    }
+    EXPECT_GT(edges, 50000);
+    EXPECT_EQ(hidden, 0);
+}
+
+TEST(EdgesOfWalks, AreVisible) {
+    const std::string masked =
+        "<bsdf type=\"mask\"><texture name=\"opacity\" type=\"checkerboard\"><float "
+        "name=\"color0\" value=\"0.2\"/><float name=\"color1\" value=\"0.9\"/><transform "
+        "name=\"to_uv\"><scale value=\"3\"/></transform></texture>" +
+        test::diffuse("0.6,0.5,0.4") + "</bsdf>";
+    for (const std::string& veil :
+         {std::string(), test::rectangle("<scale value=\"0.9\"/><rotate x=\"1\" angle=\"-60\"/>"
+                                         "<translate z=\"0.6\"/>",
+                                         masked)}) {
+        SCOPED_TRACE(veil.empty() ? "room" : "veil");
+        const Scene scene = test::build(test::mixed_room(test::front_camera(8)) + veil);
+        expect_visible_edges<TransportMode::Radiance>(scene);
+        expect_visible_edges<TransportMode::Importance>(scene);
+    }
+}
+
 TEST(Survival, IsAProbability) {
     EXPECT_EQ(Survival(1).value(), 1);
     EXPECT_EQ(Survival(0.5f).value(), 0.5f);

@@ -13,6 +13,7 @@
 
 #include "error_of.h"
 #include "render/merging.h"
+#include "render/method_choice.h"
 #include "render/render_request.h"
 #include "resumable.h"
 #include "system/section_file.h"
@@ -241,13 +242,31 @@ TEST(Checkpoint, ChainsThatCannotBeLoadedAreKept) {
     saved.save(state);
     SectionReader reader(state.take(), "state");
     other.load(reader);
-    EXPECT_NE(error_of([&] { renderings.run(other, 3, log); }).find("another number of chains"),
+    EXPECT_NE(error_of([&] { renderings.run(other, 3, log); }).find("of other chains"),
               std::string::npos);
     EXPECT_EQ(other.film().passes(), 2u);
     LearnedState before, after;
     saved.integrator().save(before);
     other.integrator().save(after);
     EXPECT_TRUE(before.bytes() == after.bytes());
+}
+
+/// Names of files may hold any bytes, but the header is text.
+TEST(Checkpoint, HasTheChoiceOfAMethodWhateverFilesAreCalled) {
+    const Scene scene = build(mixed_room(lens_camera(16)));
+    const Renderings renderings(scene);
+    RenderSettings settings = settings_of("auto:chains=false,user_paths=\xff.json");
+    settings.spp = 3;
+    renderings.render("a", with_chosen_method(scene, settings), 3);
+    const auto read = MethodChoice::from_json(CheckpointFile(renderings.file("a")).header().choice);
+    const RenderSettings again = with_chosen_method(settings, read);
+    renderings.resume("a", again, 4);
+    // The file itself keeps its name.
+    const MethodChoice of_paths{
+        .asked = read.asked, .chosen = "mlt:user_paths=\xff.json", .candidates = {}};
+    EXPECT_EQ(with_chosen_method(settings, MethodChoice::from_json(of_paths.to_text()))
+                  .integrator.params.at("user_paths"),
+              "\xff.json");
 }
 
 /// The message with which a checkpoint is refused.

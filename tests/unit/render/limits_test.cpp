@@ -77,6 +77,17 @@ TEST(RenderLimits, LightPathsThatMayNotFitAreNamedBefore) {
     }
 }
 
+TEST(RenderLimits, RenderersNameTheLightPathsThatMayNotFit) {
+    const Scene scene = small_scene(64);
+    for (const char* method : {"path", "upg"}) {
+        RenderSettings settings;
+        settings.integrator = IntegratorSpec::parse(method);
+        const Renderer renderer(scene, settings);
+        EXPECT_EQ(memory_warnings(renderer, 1 << 20).size(), method == std::string("upg"));
+        EXPECT_TRUE(memory_warnings(renderer, uint64_t(1) << 33).empty());
+    }
+}
+
 /// A closed room whose walls reflect all light: only roulette ends its paths.
 Scene white_room() {
     return build(sensor("0,0,3", "0,0,0", 64) +

@@ -2,17 +2,20 @@
 
 #include "render/method_choice.h"
 
+#include <algorithm>
+#include <chrono>
 #include <filesystem>
+#include <thread>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "error_of.h"
 #include "integrator/auto.h"
-#include "math/hash.h"
 #include "math/statistics.h"
-#include "render/pilot_score.h"
+#include "render/pilot_rendering.h"
 #include "render/render_request.h"
+#include "sampler/pilot_seed.h"
 #include "test_scenes.h"
 #include "thread_ranks.h"
 
@@ -76,25 +79,47 @@ TEST(MethodChoice, IsAFunctionOfSceneSeedAndBudget) {
     EXPECT_NE(text(), first);
 }
 
+/// A rendering of some passes.
+std::unique_ptr<Renderer> rendered(const Scene& scene, const RenderSettings& settings) {
+    auto r = std::make_unique<Renderer>(scene, settings);
+    r->run(
+        {.spp = 5, .seconds = {}, .error = {}}, [](const Progress&) {}, std::atomic<bool>{false});
+    return r;
+}
+
 TEST(MethodChoice, TheChosenTextGivesTheSameBits) {
-    const Scene scene = scene_of_project("ring.xml", 96, 72);
-    RenderSettings settings = settings_of(scene, "auto", 1e9);
-    settings.spp = 400;
-    const std::atomic<bool> never{false};
-    Renderer automatic(scene, settings);
-    ASSERT_TRUE(automatic.settings().choice);
-    EXPECT_GT(automatic.settings().choice->candidates.front().images, 0);
-    automatic.run(
-        {.spp = 5, .seconds = {}, .error = {}}, [](const Progress&) {}, never);
-    settings.integrator = IntegratorSpec::parse(automatic.settings().choice->chosen);
-    Renderer given(scene, settings);
-    EXPECT_FALSE(given.settings().choice);
-    given.run(
-        {.spp = 5, .seconds = {}, .error = {}}, [](const Progress&) {}, never);
-    EXPECT_TRUE(automatic.film().image() == given.film().image());
-    EXPECT_EQ(automatic.stats().rays(), given.stats().rays());
-    // The time of pilots counts.
-    EXPECT_GE(automatic.seconds(), automatic.settings().choice->seconds);
+    const std::string lit = front_camera(72) + room() + area_lamp();
+    const auto with = [&](const std::string& integrator) {
+        return build(lit + "<integrator type=\"" + integrator + "</integrator>");
+    };
+    // Where the scene has parameters for the chosen method, too, and where it has a limit that is asked for otherwise.
+    const std::string limit = "<integer name=\"max_depth\" value=\"2\"/>";
+    std::vector<Scene> scenes;
+    scenes.push_back(scene_of_project("ring.xml", 96, 72));
+    scenes.push_back(with("path\"><integer name=\"rr_depth\" value=\"2\"/>"));
+    scenes.push_back(with("bdpt\"><integer name=\"rr_depth\" value=\"3\"/>"));
+    scenes.push_back(with("path\">" + limit));
+    for (const Scene& scene : scenes)
+        for (const char* asked : {"auto:chains=false", "auto:chains=false,max_depth=-1"}) {
+            SCOPED_TRACE(asked);
+            RenderSettings settings = settings_of(scene, asked, 1e9);
+            settings.spp = 400;
+            const auto automatic = rendered(scene, settings);
+            const auto choice = automatic->settings().choice;
+            ASSERT_TRUE(choice);
+            SCOPED_TRACE(choice->chosen);
+            EXPECT_GT(choice->candidates.front().images, 0);
+            settings.integrator = choose_integrator(scene, choice->chosen);
+            const auto given = rendered(scene, settings);
+            EXPECT_FALSE(given->settings().choice);
+            EXPECT_TRUE(automatic->film().image() == given->film().image());
+            EXPECT_EQ(automatic->stats().rays(), given->stats().rays());
+            // The time of pilots counts.
+            EXPECT_GE(automatic->seconds(), choice->seconds);
+            // A rendering that goes on has it, too.
+            settings.integrator = choose_integrator(scene, asked);
+            EXPECT_EQ(with_chosen_method(settings, *choice).integrator.to_string(), choice->chosen);
+        }
 }
 
 /// Chains cannot be shared.
@@ -122,6 +147,12 @@ TEST(MethodChoice, PilotsTakeASmallPart) {
         EXPECT_DOUBLE_EQ(c.budget, seconds);
         // The first pilot of a scene may be dearer than those of a usual one.
         EXPECT_LE(c.pilots, 0.12 * c.budget);
+    }
+    // With guides and all chains.
+    const Scene ring = scene_of_project("ring.xml", 480, 360);
+    for (const double seconds : {10.0, 16.0, 30.0}) {
+        SCOPED_TRACE(seconds);
+        EXPECT_LE(choice_of(ring, "auto", seconds).pilots, 0.085 * seconds);
     }
     // No pilots where they would take longer than that.
     const MethodChoice none = choice_of(scene, "auto", 0.001);
@@ -162,6 +193,17 @@ TEST(MethodChoice, CandidatesAreThoseThatMayBe) {
               (Names{"bdpt", "mlt", "mmlt", "pcbpt", "upg+bdpt"}));
 }
 
+/// Those of which there was no time for pilots are told, too.
+TEST(MethodChoice, TellsOfAllCandidates) {
+    const Scene scene = scene_of_project("cornell.xml", 200, 200);
+    const MethodChoice c = choice_of(scene, "auto", 0.6);
+    EXPECT_EQ(methods_of(c),
+              (std::vector<std::string>{"bdpt", "mlt", "mmlt", "path", "pcbpt", "upg+bdpt"}));
+    EXPECT_GT(c.candidates.front().images, 0);
+    EXPECT_EQ(c.candidates.back().images, 0);
+    EXPECT_EQ(c.candidates.back().pixels, 0);
+}
+
 TEST(MethodChoice, ParametersAreThoseOfTheMethod) {
     const Scene scene = build(front_camera(16) + room() + area_lamp());
     const MethodChoice c = choice_of(scene, "auto:max_depth=4,chains=false");
@@ -194,61 +236,122 @@ TEST(MethodChoice, IsWrittenAndRead) {
     EXPECT_NE(error_of([] { MethodChoice::from_json("no"); }).find("damaged"), std::string::npos);
 }
 
-/// The pixels of a small rendering, in images of one pass each, and their mean.
-struct Passes {
-    PilotImages images;
-    double mean = 0;
+/// The images of the passes of a rendering, in grey.
+std::vector<std::vector<float>> passes_of(const Scene& scene, RenderSettings settings) {
+    settings.spp = kPilotPasses;
+    Renderer r(scene, settings);
+    std::vector<std::vector<float>> images;
+    std::vector<float> before(scene.film().pixel_count());
+    r.run(
+        settings,
+        [&](const Progress&) {
+            auto& image = images.emplace_back();
+            for (size_t i = 0; i < before.size(); ++i) {
+                const Film::Moments& m = r.film().moments()[i];
+                const auto sum = float((m.sum[0] + m.sum[1] + m.sum[2]) / 3);
+                image.push_back(sum - before[i]);
+                before[i] = sum;
+            }
+        },
+        std::atomic<bool>{false});
+    return images;
+}
 
-    Passes(const Scene& scene, const std::string& method, uint64_t seed) {
-        constexpr int kPasses = 4;
-        RenderSettings s;
-        s.integrator = IntegratorSpec::parse(method);
-        s.seed = seed;
-        s.threads = 1;
-        s.spp = kPasses;
-        Renderer r(scene, s);
-        std::vector<double> before(scene.film().pixel_count());
-        r.run(
-            s,
-            [&](const Progress&) {
-                auto& image = images.images.emplace_back();
-                for (size_t i = 0; i < before.size(); ++i) {
-                    const double sum = r.film().moments()[i].sum[0];
-                    image.push_back(float(sum - before[i]));
-                    before[i] = sum;
-                }
-            },
-            std::atomic<bool>{false});
-        for (const double v : before) mean += v / kPasses / double(before.size());
-        images.horizon = kPasses;
-    }
-};
-
-/// A choice by the passes that it steers prefers methods whose samples happen to be dark. Means over many renderings show
-/// it; they do not where the passes are others.
-TEST(MethodChoice, ByThePassesThatItSteersWouldBeBiased) {
-    const Scene scene = scene_of_project("ring.xml", 12, 9);
-    const std::vector<std::string> methods{"path:max_depth=3", "bdpt:max_depth=3"};
-    Moments seen, unseen;  // relative to one of the methods, which is unbiased
-    for (uint64_t seed = 0; seed < 400; ++seed) {
-        std::vector<Passes> own, others;
-        for (const std::string& m : methods) {
-            own.emplace_back(scene, m, hash_combine(seed, 1));
-            others.emplace_back(scene, m, hash_combine(seed, 2));
+/// A choice by the passes that it steers would prefer methods whose samples happen to be dark: pilots have others.
+TEST(Pilots, HaveNoPassOfTheRendering) {
+    const Scene scene = scene_of_project("ring.xml", 24, 18);
+    const std::atomic<bool> never{false};
+    for (const SamplerKind sampler : {SamplerKind::Sobol, SamplerKind::Independent})
+        for (const char* method : {"path", "bdpt", "pcbpt", "mlt:groups=4,chains=16"}) {
+            SCOPED_TRACE(method);
+            RenderSettings settings = settings_of(scene, method, 1);
+            settings.sampler = sampler;
+            settings.seed = 7;
+            const auto own = passes_of(scene, settings);
+            const Pilot pilot = render_pilot(scene, settings, 0, never);
+            std::vector<std::vector<float>> all = pilot.images.images;
+            ASSERT_GE(all.size(), size_t(2 * kPilotReplicates));
+            // The comparison can find equal ones.
+            RenderSettings same = settings;
+            same.seed = pilot_seed(settings.seed, PilotUse::Choice, 0);
+            const auto first = passes_of(scene, same);
+            EXPECT_NE(std::find(first.begin(), first.end(), all[0]), first.end());
+            // Nor are any of them equal.
+            all.insert(all.end(), own.begin(), own.end());
+            std::sort(all.begin(), all.end());
+            EXPECT_EQ(std::adjacent_find(all.begin(), all.end()), all.end());
         }
-        const auto best = [&](const std::vector<Passes>& of) {
-            const std::vector<PilotImages> images{of[0].images, of[1].images};
-            const auto s = score_pilots(images, 12, 9);
-            return s[0].error() <= s[1].error() ? 0 : 1;
-        };
-        seen.add(own[size_t(best(own))].mean - own[1].mean);
-        unseen.add(own[size_t(best(others))].mean - own[1].mean);
-    }
-    const auto errors = [](const Moments& m) {
-        return m.mean() / std::sqrt(m.variance() / double(m.count()));
+}
+
+/// Passes of a Sobol' sequence have less noise together than as many independent ones. Pilots see a part of that, since they
+/// have few passes.
+TEST(Pilots, PredictWhatTheSamplerGains) {
+    const Scene scene = scene_of_project("cornell.xml", 64, 64);
+    constexpr uint64_t kSpp = 64;
+    const std::atomic<bool> never{false};
+    RenderSettings settings = settings_of(scene, "path", 1);
+    settings.seconds = {};
+    const auto predicted = [&] {
+        PilotImages pilot = render_pilot(scene, settings, 0, never).images;
+        pilot.horizon = double(kSpp);
+        return score_pilots({&pilot, 1}, 64, 64).front().error();
     };
-    EXPECT_LT(std::abs(errors(unseen)), 4) << unseen.mean();
-    EXPECT_LT(errors(seen), -6) << seen.mean();
+    const auto measured = [&] {
+        std::vector<Moments> pixels(64 * 64);
+        for (uint64_t seed = 0; seed < 6; ++seed) {
+            RenderSettings s = settings;
+            s.seed = seed;
+            s.spp = kSpp;
+            Renderer r(scene, s);
+            r.run(
+                s, [](const Progress&) {}, never);
+            const std::vector<Rgb> image = r.film().image();
+            for (size_t i = 0; i < image.size(); ++i)
+                pixels[i].add(double(image[i].r + image[i].g + image[i].b) / 3);
+        }
+        double mean = 0, error = 0;
+        for (const Moments& m : pixels) mean += m.mean() / double(pixels.size());
+        for (const Moments& m : pixels)
+            error += m.variance() / (sqr(m.mean()) + 0.01 * sqr(mean)) / double(pixels.size());
+        return error;
+    };
+    settings.sampler = SamplerKind::Independent;
+    const double independent = predicted(), independent_error = measured();
+    settings.sampler = SamplerKind::Sobol;
+    const double sobol = predicted(), sobol_error = measured();
+    EXPECT_NEAR(independent, independent_error, 0.4 * independent_error);
+    const double gain = sobol_error / independent_error;
+    EXPECT_LT(gain, 0.7);
+    EXPECT_NEAR(sobol / independent, gain, 0.3 * gain);
+}
+
+/// Pilots end at once.
+TEST(MethodChoice, CanBeInterrupted) {
+    const Scene scene = scene_of_project("ring.xml", 480, 360);
+    std::atomic<bool> drop{true};
+    const auto begin = std::chrono::steady_clock::now();
+    EXPECT_THROW(with_chosen_method(scene, settings_of(scene, "auto", 1e5), drop), PassDropped);
+    drop = false;
+    std::thread interrupt([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(300));
+        drop = true;
+    });
+    EXPECT_THROW(with_chosen_method(scene, settings_of(scene, "auto", 1e5), drop), PassDropped);
+    interrupt.join();
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
+}
+
+TEST(MethodChoice, MessageComparesWhatIsComparable) {
+    MethodChoice c;
+    c.chosen = "path";
+    c.candidates = {{.method = "path", .pixels = 768, .images = 12, .noise = 0.1},
+                    {.method = "bdpt", .pixels = 768, .images = 12, .noise = 0.2}};
+    EXPECT_NE(c.message().find("0.5 of the time of bdpt"), std::string::npos);
+    c.candidates[1].pixels = 3072;
+    EXPECT_EQ(c.message().find("of the time"), std::string::npos);
+    c.candidates[1].pixels = 768;
+    c.candidates[0].noise = c.candidates[1].noise = 0;  // a black scene
+    EXPECT_EQ(c.message(), "auto: path (pilots: 0.0 s)");
 }
 
 }  // namespace

@@ -181,5 +181,36 @@ TEST(PilotScore, OfBlackImagesIsZero) {
         EXPECT_EQ(s.error(), 0);
 }
 
+/// Images of which two and two complement each other, apart from a part that is independent.
+TEST(PilotScore, PassesOfASequenceHaveTheNoiseOfTheirMean) {
+    PilotImages own = images(12, 5, noisy(0.1), 100), opposite = images(12, 6, noisy(0.4), 100);
+    for (size_t k = 0; k < own.images.size(); ++k)
+        for (size_t i = 0; i < own.images[k].size(); ++i)
+            own.images[k][i] += (k % 2 == 0 ? 1.0f : -1.0f) * (opposite.images[k / 2][i] - 1);
+    const double single = 0.01 + 0.16, of_mean = 0.01;
+    EXPECT_GT(score({own})[0].noise, 0.9 * single / 101);
+    own.in_sequence = 2;
+    EXPECT_NEAR(score({own})[0].noise, of_mean / 101, 0.2 * of_mean / 101);
+}
+
+/// What falls from film to film beyond the noise of other methods goes on falling; a method that is new has the gain of
+/// another one.
+TEST(ReuseFactors, GoOnToTheFilmOfTheRendering) {
+    using Kind = NoiseOfFilms::Kind;
+    const std::vector<NoiseOfFilms> methods{{.kind = Kind::Independent, .before = 1.2, .now = 1},
+                                            {.kind = Kind::Reuse, .before = 1.8, .now = 1},
+                                            {.kind = Kind::Reuse, .now = 0.7, .like = 1},
+                                            {.kind = Kind::Reuse, .now = 0.7},
+                                            {.kind = Kind::Reuse, .before = 9, .now = 1},
+                                            {.kind = Kind::Chains, .before = 9, .now = 1}};
+    const std::vector<double> f = reuse_factors(methods, 4, 16);
+    EXPECT_DOUBLE_EQ(f[0], 1);
+    EXPECT_NEAR(f[1], 1 / sqr(1.5), 1e-12);
+    EXPECT_DOUBLE_EQ(f[2], f[1]);
+    EXPECT_DOUBLE_EQ(f[3], 1);
+    EXPECT_NEAR(f[4], 1 / sqr(kMostGainOfReuse), 1e-12);
+    EXPECT_DOUBLE_EQ(f[5], 1);
+}
+
 }  // namespace
 }  // namespace etendue::test

@@ -8,10 +8,12 @@
 #include <fstream>
 #include <future>
 #include <random>
+#include <thread>
 
 #include <gtest/gtest.h>
 
 #include "no_memory.h"
+#include "render/method_choice.h"
 #include "run_program.h"
 #include "run_request.h"
 #include "session/workers.h"
@@ -303,6 +305,43 @@ TEST(Session, TakesCommandsOfSeveralThreads) {
     session.settle();
     for (const RunStatus& s : session.runs())
         EXPECT_TRUE(s.state == RunState::Stopped || s.state == RunState::Finished);
+}
+
+/// The pilots of `auto` take time before the first seed, and no other.
+TEST(Seeds, CountTheChoiceOfTheMethodOnce) {
+    Session session(small_room, 2);
+    ASSERT_TRUE(wait_for_scene(session));
+    RunRequest r = run_of("auto:chains=false", 1);
+    r.spp = {};
+    r.error = 0.95;  // which pilots do not know before the first of them
+    r.seeds = 3;
+    const int run = session.start(r);
+    ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Finished; }));
+    const auto choice = session.status(run).choice;
+    ASSERT_TRUE(choice);
+    EXPECT_GT(choice->candidates.front().images, 0);
+    const auto series = session.seed_series(run);
+    ASSERT_EQ(series->seconds.size(), 3u);
+    EXPECT_GE(series->seconds[0], choice->seconds);
+    EXPECT_LT(series->seconds[1], choice->seconds);
+    EXPECT_LT(series->seconds[2], choice->seconds);
+}
+
+/// A run whose method is being chosen ends at once.
+TEST(Session, StopsWhilePilotsRender) {
+    Session session([] { return build(sensor("0,0,3.5", "0,0,0", 240) + room() + area_lamp()); },
+                    1);
+    ASSERT_TRUE(wait_for_scene(session));
+    for (const bool discards : {false, true}) {
+        const int run = session.start(run_of("auto", 1u << 30));
+        std::this_thread::sleep_for(300ms);
+        const auto begin = std::chrono::steady_clock::now();
+        discards ? session.discard(run) : session.stop(run);
+        ASSERT_TRUE(wait_for([&] { return session.status(run).state == RunState::Stopped; }));
+        EXPECT_LT(std::chrono::steady_clock::now() - begin, 2s);
+        EXPECT_FALSE(session.status(run).choice);
+        EXPECT_EQ(session.status(run).passes, 0u);
+    }
 }
 
 /// The renderings of a run with several seeds are those of `render` with each seed, in turns with another run; the run

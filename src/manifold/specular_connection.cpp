@@ -1,0 +1,248 @@
+#include "manifold/specular_connection.h"
+
+namespace etendue {
+namespace {
+
+/// Weight of X against the hit: `ratio` is p̂ over the hit's density.
+double specular_weight(double ratio) {
+    return std::isfinite(ratio) ? sqr(ratio) / (1 + sqr(ratio)) : 1;
+}
+
+/// p̂ over the density of the hit, both without the probabilities of the events, which they share. `pdf`: density of the
+/// chain's first direction.
+double density_ratio(const LampPoint& lamp, const ChainRay& ray, double jacobian, double pdf) {
+    const double cosine = lamp.is_infinite() ? 1 : std::fabs(dot(Vec3d(lamp.ng), ray.d));
+    const double length = lamp.is_infinite() ? 1 : ray.way + lamp.passed_by(ray).distance;
+    return kSolutionShare * spread(jacobian, length) * lamp.pdf / (pdf * jacobian * cosine);
+}
+
+/// Draws y_0; its density is 0 where it has none.
+LampPoint draw_lamp_point(const Scene& scene, Sampler& sampler) {
+    const Emitter& emitter =
+        scene.sample_emitter(sampler.next_1d_fine_if(scene.has_emitter_choice()));
+    const EmissionSample e = emitter.sample_emission(sampler.next_2d_fine(), {0.5f, 0.5f});
+    return {.emitter = &emitter,
+            .p = emitter.is_infinite() ? -e.d : e.p,
+            .ng = e.ng,
+            .uv = e.uv,
+            .prim = e.prim,
+            .pdf = double(emitter.selection_pmf) * double(e.pdf_y0)};
+}
+
+/// A chain between z_{t-1} and y_0, with what the path contributes along it, without the number of trials.
+struct Solution {
+    Vec3d w;
+    ChainEvents events;
+    Rgb contribution;
+    double weight = 0;
+};
+
+/// The path along the direction `w` that Newton's method has found; empty where it contributes nothing.
+std::optional<Solution> evaluate(const Vertex& from, const LampPoint& lamp, Vec3d w,
+                                 const ChainEvents& events, ChainTracer& tracer) {
+    const BsdfEval f = from.eval(to_float(w), TransportMode::Radiance);
+    if (f.f.is_zero() || !tracer.follow(w, events)) return {};
+    const ChainRay& ray = tracer.ray();
+    const Rgb emitted = lamp.emission(-to_float(ray.d));
+    if (emitted.is_zero()) return {};
+    const double jacobian = lamp.passed_by(ray).jacobian();
+    const Rgb C = from.beta * f.f * tracer.value() * emitted * float(jacobian / lamp.pdf);
+    if (C.is_zero() || !std::isfinite(luminance(C))) return {};
+    const Rgb Tr = tracer.transmittance_to(lamp);
+    if (Tr.is_zero()) return {};
+    const double weight = lamp.emitter->is_delta()
+                              ? 1
+                              : specular_weight(density_ratio(lamp, ray, jacobian, double(f.pdf)));
+    return Solution{w, events, C * Tr, weight};
+}
+
+/// Number of seeds until one leads to the solution. No cap: after ten million there is a defect, and 0 is returned.
+uint64_t count_trials(const Solution& found, const LampPoint& lamp, ChainSeeds& seeds,
+                      ChainTracer& tracer, Sampler& sampler, Workspace& work) {
+    constexpr uint64_t kRunaway = 10'000'000, kSeldom = 1024;
+    for (uint64_t n = 1; n <= kRunaway; ++n) {
+        if (n % kSeldom == 0) work.go_on();
+        ++work.stats.chain_trials;
+        const auto seed = seeds.draw(sampler, &found.events);
+        if (!seed || !(seed->events == found.events)) continue;
+        const auto w = tracer.solve(seed->w, seed->events, lamp);
+        if (w && is_same_solution(*w, found.w)) return n;
+    }
+    ++work.stats.runaways;
+    return 0;
+}
+
+/// Makes `y` the light side of the path, from y_0 on.
+void record(const LampPoint& lamp, const Solution& found, ChainTracer& tracer, SubPath& y) {
+    y.clear();
+    for (int i = 0; i <= found.events.count; ++i) y.append();
+    Vertex& y0 = y[0];
+    y0.kind = Vertex::Kind::Emitter;
+    y0.emitter = lamp.emitter;
+    y0.p = lamp.p;
+    y0.is_infinite = lamp.is_infinite();
+    tracer.start(found.w);
+    for (int i = 0; i < found.events.count; ++i) {
+        tracer.advance();
+        tracer.leave(found.events.number[size_t(i)]);
+        Vertex& v = y[found.events.count - i];
+        v.kind = Vertex::Kind::Surface;
+        v.p = tracer.vertex().p;
+        v.ng = tracer.vertex().ng;
+        v.shape = tracer.vertex().shape;
+        v.event = tracer.vertex().event;
+        v.is_delta = true;
+    }
+}
+
+/// Follows a known chain of a path, from its eye vertex to its lamp.
+class KnownChain {
+public:
+    KnownChain(const Scene& scene, Vec3 from, Vec3 to_first)
+        : scene_(scene), ray_(ChainRay::start(Vec3d(from), normalize(Vec3d(to_first)))) {}
+
+    /// Goes on to `v`, and leaves it by its event; `toward` is the direction there toward the eye. False where chains may
+    /// not have it.
+    bool pass(const Vertex& v, Vec3 toward) {
+        if (!may_be_in_chain(*v.shape)) return false;
+        const auto jet = scene_.jet(v.location, ray_.o, ray_.d, dot(Vec3d(v.p) - ray_.o, ray_.d));
+        const auto s = v.bsdf.sample_delta(toward, v.event, TransportMode::Radiance);
+        if (!jet || !s) return false;
+        ray_.arrive(*jet);
+        if (v.event % 2 == 0) {
+            ray_.reflect(*jet);
+            return true;
+        }
+        return ray_.refract(*jet, double(s->eta));
+    }
+    /// Factor of the weight of a hit of the lamp there. `pdf`: density of the chain's first direction.
+    float rest_beside(const LampPoint& lamp, double pdf) const {
+        const double ratio = density_ratio(lamp, ray_, lamp.passed_by(ray_).jacobian(), pdf);
+        return float(1 - specular_weight(ratio));
+    }
+
+private:
+    const Scene& scene_;
+    ChainRay ray_;
+};
+
+}  // namespace
+
+bool is_left_to_hits(const SubPath& z, int t, const TechniqueCounts& counts) {
+    if (counts.uses_pairs()) return false;
+    for (int i = t - 1; i > 0; --i) {
+        const bool is_split = (i == t - 1 || !z[i].is_delta) && !z[i - 1].is_delta;
+        if (is_split && (i == 1 ? counts.splat : counts.connect) > 0) return false;
+    }
+    return true;
+}
+
+std::optional<Join> join_specular(const Scene& scene, const SubPath& z, int t,
+                                  const SpecularLimits& limits, Sampler& sampler,
+                                  const TechniqueCounts& counts, Workspace& work) {
+    // Numbers of seeds and trials, which are many.
+    constexpr uint64_t kTrials = uint64_t(1) << 32;
+    const Vertex& from = z[t - 1];
+    const int depth = std::min(counts.specular_depth, limits.max_depth - t);
+    if (depth < 1 || !from.is_connectible || !scene.has_emitters()) return {};
+    if (!is_left_to_hits(z, t, counts)) return {};
+
+    sampler.seek(Stream::Auxiliary, uint64_t(t));
+    const LampPoint lamp = draw_lamp_point(scene, sampler);
+    if (!(lamp.pdf > 0)) return {};
+    ChainTracer tracer(scene, from, work.stats);
+    ChainSeeds seeds(scene, from, lamp, depth, tracer, work.stats);
+    sampler.seek(Stream::Auxiliary, kTrials | uint64_t(t));
+    const auto seed = seeds.draw(sampler);
+    if (!seed) return {};
+    // Russian roulette before Newton's method by what the path may contribute, and again when that is known.
+    // The guess may be far too low where light is focused.
+    constexpr float kLeast = 0.3f, kMargin = 3;
+    const float film_weight = std::fabs(z.film_weight);
+    const auto survives = [&](float q) { return q >= 1 || sampler.next_1d() < q; };
+    const Rgb f = from.eval_unguided(to_float(seed->w), TransportMode::Radiance).f;
+    const float guess = luminance(from.beta * f * seed->guess) / float(lamp.pdf) * film_weight,
+                q_guess = std::fmax(kLeast, join_survival(kMargin * guess, limits.threshold));
+    if (!survives(q_guess)) return {};
+    const auto w = tracer.solve(seed->w, seed->events, lamp);
+    if (!w) return {};
+    auto found = evaluate(from, lamp, *w, seed->events, tracer);
+    if (!found) return {};
+    found->contribution *= 1 / q_guess;
+    const float share = luminance(found->contribution) * float(found->weight) * film_weight,
+                q = join_survival(share, limits.threshold);
+    if (!survives(q)) return {};
+    found->contribution *= 1 / q;
+    ++work.stats.chains;
+    const uint64_t trials = count_trials(*found, lamp, seeds, tracer, sampler, work);
+    if (work.is_observed) record(lamp, *found, tracer, work.pair);
+    tracer.start(found->w);
+    tracer.advance();
+    return Join{.technique = {Strategy::Specular, found->events.count + 1, t},
+                .emitter = lamp.emitter,
+                .contribution = found->contribution * float(trials),
+                .mis_weight = float(found->weight),
+                .film = z.film,
+                .a = from.ray_end(),
+                .b = tracer.vertex().ray_end(),
+                .needs_test = false};
+}
+
+float hit_beside_specular(const Scene& scene, const SubPath& z, int t, const Emitter& emitter,
+                          const TechniqueCounts& counts) {
+    const int last = t - 1;
+    int from = last - 1;  // the eye vertex before the chain
+    while (from > 0 && z[from].is_delta) --from;
+    const int events = last - 1 - from;
+    if (from == 0 || events == 0 || events > counts.specular_depth) return 1;
+    if (!is_left_to_hits(z, from + 1, counts)) return 1;
+    const Vertex& end = z[last];
+    KnownChain chain(scene, z[from].p, z[from + 1].p - z[from].p);
+    for (int i = from + 1; i < last; ++i)
+        if (!chain.pass(z[i], z[i].wo)) return 1;
+    const EmitterHit e = end.is_infinite
+                             ? emitter.eval_infinite(end.p)
+                             : emitter.eval_surface(end.ng, end.uv, end.location.prim, end.wo);
+    const LampPoint lamp{.emitter = &emitter,
+                         .p = end.p,
+                         .ng = end.ng,
+                         .uv = end.uv,
+                         .prim = end.location.prim,
+                         .pdf = double(emitter.selection_pmf) * double(e.pdf_y0)};
+    const Vertex& first = z[from + 1];
+    const double pdf = double(first.pdf_fwd) * double(length2(first.p - z[from].p)) /
+                       double(abs_dot(first.ng, first.wo));
+    return chain.rest_beside(lamp, pdf);
+}
+
+float hit_lens_beside_specular(const Scene& scene, const SubPath& y, int s,
+                               const TechniqueCounts& counts) {
+    int from = 1;
+    while (from < s && y[from].is_delta) ++from;
+    const int events = from - 1;
+    if (events == 0 || from >= s || events > counts.specular_depth) return 1;
+    // Of the rest, a splat or a connection makes the path where two vertices without delta event meet.
+    for (int i = from; i < s; ++i) {
+        const bool is_last = i + 1 == s;
+        if (y[i].is_delta || (!is_last && y[i + 1].is_delta)) continue;
+        if ((is_last ? counts.splat : counts.connect) > 0) return 1;
+    }
+    const Vertex& y0 = y[0];
+    if (y0.emitter->is_delta()) return 0;
+    KnownChain chain(scene, y[from].p, y[from - 1].p - y[from].p);
+    for (int i = from - 1; i > 0; --i)
+        if (!chain.pass(y[i], normalize(y[i + 1].p - y[i].p))) return 1;
+    const Vec3 w = direction(y0, y[1]);
+    const EmitterHit e = y0.is_infinite
+                             ? y0.emitter->eval_infinite(y0.p)
+                             : y0.emitter->eval_surface(y0.ng, y0.uv, y0.location.prim, w);
+    const LampPoint lamp{.emitter = y0.emitter,
+                         .p = y0.p,
+                         .ng = y0.ng,
+                         .uv = y0.uv,
+                         .prim = y0.location.prim,
+                         .pdf = double(y0.emitter->selection_pmf) * double(e.pdf_y0)};
+    return chain.rest_beside(lamp, double(y[from - 1].pdf_rev) / double(y[from].to_predecessor));
+}
+
+}  // namespace etendue

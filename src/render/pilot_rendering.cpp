@@ -1,0 +1,115 @@
+#include "render/pilot_rendering.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "guide/guide.h"
+#include "render/cost_table.h"
+#include "sampler/pilot_seed.h"
+
+namespace etendue {
+namespace {
+
+/// Grey values of the sums of a film.
+std::vector<float> grey(const Film& film) {
+    std::vector<float> values;
+    values.reserve(film.moments().size());
+    for (const Film::Moments& m : film.moments())
+        values.push_back(float((m.sum[0] + m.sum[1] + m.sum[2]) / 3));
+    return values;
+}
+
+/// Of chains, for each pixel and pass.
+double mutations_of(const Renderer& renderer) {
+    for (const auto& [name, value] : renderer.integrator().figures())
+        if (name == "mutations_per_pixel") return value;
+    return 1;
+}
+
+/// The images of one rendering: of each pass or, of chains, of each of their groups.
+class ReplicateImages {
+public:
+    /// `first`: the first pass that counts.
+    ReplicateImages(int groups, uint64_t first) : groups_(uint64_t(groups)), first_(first) {
+        images.resize(groups_);
+    }
+    int passes_per_image() const { return groups_ > 0 ? kPilotPasses / int(groups_) : 1; }
+    void add(const Film& film, uint64_t pass) {
+        std::vector<float> sum = grey(film), image = sum;
+        if (!before_.empty())
+            for (size_t i = 0; i < image.size(); ++i) image[i] -= before_[i];
+        before_ = std::move(sum);
+        if (groups_ == 0) {
+            if (pass >= first_) images.push_back(std::move(image));
+            return;
+        }
+        std::vector<float>& of_group = images[pass % groups_];
+        of_group.resize(image.size());
+        for (size_t i = 0; i < image.size(); ++i)
+            of_group[i] += image[i] / float(passes_per_image());
+    }
+
+    std::vector<std::vector<float>> images;
+
+private:
+    uint64_t groups_, first_;
+    std::vector<float> before_;
+};
+
+void add_replicate(const Scene& small, RenderSettings settings, uint64_t number,
+                   const std::atomic<bool>& drop, Pilot& pilot) {
+    settings.seed = pilot_seed(settings.seed, PilotUse::Choice, number);
+    static_cast<RenderLimits&>(settings) = {.spp = kPilotPasses, .seconds = {}, .error = {}};
+    Renderer renderer(small, settings);
+    const int groups = renderer.integrator().error_groups();
+    // What methods learn, they learn before the first pass and after it. Chains begin in the first pass of their group.
+    const uint64_t first = renderer.integrator().is_learning() ? 1 : 0,
+                   costs_from = groups > 0 ? uint64_t(groups) : first;
+    const Guide* guide = settings.integrator.guide.get();
+    const bool is_guided = guide && guide->guides_surfaces();
+    ReplicateImages made(groups, first);
+    double seconds = 0, first_seconds = 0;
+    const StopReason reason = renderer.run(
+        settings,
+        [&](const Progress& p) {
+            made.add(renderer.film(), p.passes - 1);
+            seconds = simulated_seconds(settings.integrator.name, is_guided, renderer.stats());
+            if (p.passes == costs_from) first_seconds = seconds;
+        },
+        drop, drop);
+    if (reason == StopReason::Interrupted) throw PassDropped();
+
+    pilot.has_chains = groups > 0;
+    pilot.passes_per_image = made.passes_per_image();
+    pilot.images.in_sequence =
+        settings.sampler == SamplerKind::Sobol && groups == 0 ? int(made.images.size()) : 1;
+    for (auto& image : made.images) pilot.images.images.push_back(std::move(image));
+    const double pass = (seconds - first_seconds) / double(kPilotPasses - costs_from);
+    pilot.pass_seconds += pass / kPilotReplicates;
+    pilot.all_seconds += seconds;
+    if (groups == 0) return;
+    pilot.images.least_variance = 1 / (mutations_of(renderer) * pilot.passes_per_image);
+    pilot.start_seconds +=
+        std::max(0.0, first_seconds - double(costs_from) * pass) / kPilotReplicates;
+}
+
+}  // namespace
+
+std::pair<int, int> size_of_pilot(const FilmGeometry& film, double pixels) {
+    const double scale = std::sqrt(std::min(1.0, pixels / double(film.pixel_count())));
+    const auto side = [&](int whole) {
+        return std::clamp(int(std::lround(scale * whole)), 1, whole);
+    };
+    return {side(film.crop_width), side(film.crop_height)};
+}
+
+Pilot render_pilot(const Scene& small, const RenderSettings& settings, uint64_t first,
+                   const std::atomic<bool>& drop) {
+    Pilot pilot;
+    for (uint64_t r = 0; r < kPilotReplicates; ++r)
+        add_replicate(small, settings, first + r, drop, pilot);
+    return pilot;
+}
+
+}  // namespace etendue

@@ -1,0 +1,159 @@
+// Weights of specular connections and of the hits that make the same paths, against the definition in path_pdfs.h.
+
+#include "manifold/specular_connection.h"
+
+#include <gtest/gtest.h>
+
+#include "pathspace/path_pdfs.h"
+#include "test_scenes.h"
+
+namespace etendue {
+namespace {
+
+constexpr int kPixels = 16;
+
+struct SpecularCase {
+    const char* name;
+    std::string xml;
+};
+void PrintTo(const SpecularCase& c, std::ostream* out) {
+    *out << c.name;
+}
+
+std::vector<SpecularCase> weight_cases() {
+    using namespace test;
+    const std::string front = front_camera(kPixels) + room();
+    return {
+        {"lantern", lantern_room(front_camera(kPixels))},
+        {"glass_ball", front + area_lamp() + sphere("0,-0.2,0.1", "0.45", kGlass)},
+        {"mirror_and_gloss", front + area_lamp() +
+                                 sphere("-0.4,-0.5,0", "0.45", "<bsdf type=\"conductor\"/>") +
+                                 sphere("0.5,-0.5,0.2", "0.3", kPlastic)},
+        {"environment",
+         front + sphere("0,-0.2,0.1", "0.45", kGlass) + "<emitter type=\"constant\"/>"},
+        {"several",
+         front + area_lamp() + sphere("0,-0.2,0.1", "0.45", kGlass) +
+             sphere("0.1,-0.2,0.1", "0.1",
+                    "<emitter type=\"area\"><rgb name=\"radiance\" value=\"3,2,1\"/></emitter>")},
+    };
+}
+
+/// Solid angle of directions at `from` over the area normal to the rays at the lamp, from differences.
+double jacobian_of_differences(const Scene& scene, const Vertex& from, Vec3d w,
+                               const ChainEvents& events, const LampPoint& lamp) {
+    constexpr double kStep = 1e-6;
+    RenderStats stats;
+    ChainTracer tracer(scene, from, stats);
+    if (!tracer.follow(w, events)) return 0;
+    const Vec3d d = tracer.ray().d;
+    const TangentBasis first(w), last(d);
+    // Where rays cross the plane through the point, normal to the ray through it; at infinity their directions.
+    const auto crossing = [&](Vec3d along) {
+        tracer.follow(normalize(w + along * kStep), events);
+        const ChainRay& r = tracer.ray();
+        if (lamp.is_infinite()) return r.d;
+        return r.o + r.d * (dot(Vec3d(lamp.p) - r.o, d) / dot(r.d, d));
+    };
+    const Vec3d a = (crossing(first.s) - crossing(-first.s)) / (2 * kStep),
+                b = (crossing(first.t) - crossing(-first.t)) / (2 * kStep);
+    return 1 / std::fabs(dot(a, last.s) * dot(b, last.t) - dot(a, last.t) * dot(b, last.s));
+}
+
+class SpecularWeights : public ::testing::TestWithParam<std::tuple<SpecularCase, bool>> {};
+
+TEST_P(SpecularWeights, AreThoseOfTheDefinition) {
+    const auto& [test_case, has_connections] = GetParam();
+    const Scene scene = test::build(test_case.xml);
+    TechniqueCounts counts{.hit = 1, .next_event = 1, .specular_depth = 4};
+    if (has_connections) counts.connect = 1, counts.splat = kPixels * kPixels;
+    const Film film(scene.film(), scene.filter());
+    Workspace work;
+    work.is_observed = true;
+    const WalkContext walk{scene, counts, work.stats, {6, 10}};
+    Sampler sampler(SamplerKind::Independent, 5);
+    int compared = 0;
+    for (uint32_t pass = 0; pass < 40; ++pass)
+        for (uint64_t pixel = 0; pixel < uint64_t(kPixels * kPixels); ++pixel) {
+            sampler.start(pass, pixel);
+            trace_eye_path(walk, film, pixel, sampler, work.z);
+            for (int t = 2; t <= work.z.size(); ++t) {
+                const auto x = join_specular(scene, work.z, t, {20}, sampler, counts, work);
+                if (!x) continue;
+                const int k = x->technique.s - 1;
+                // The same path as a hit.
+                SubPath z;
+                start_eye_path_of_pixel(walk, film, pixel, sampler, z);
+                while (z.size() < t) ASSERT_TRUE(extend<TransportMode::Radiance>(walk, sampler, z));
+                const Vec3 w = normalize(x->b.p - z[t - 1].p);
+                const BsdfEval f = z[t - 1].eval(w, TransportMode::Radiance);
+                BsdfSample s{.wi = w, .weight = f.f / f.pdf, .pdf = f.pdf, .pdf_rev = f.pdf_rev};
+                ChainEvents events;
+                bool arrives = true;
+                for (int i = 0; i <= k && arrives; ++i) {
+                    arrives = append<TransportMode::Radiance>(walk, sampler, s, z);
+                    if (!arrives || i == k) break;
+                    events.add(work.pair[k - i].event);
+                    const auto event = z[z.size() - 1].bsdf.sample_delta(
+                        z[z.size() - 1].wo, work.pair[k - i].event, TransportMode::Radiance);
+                    arrives = event.has_value();
+                    if (arrives) s = *event, close<TransportMode::Radiance>(walk, z);
+                }
+                // Rays that end at an edge may miss the lamp.
+                if (!arrives ||
+                    (!z[z.size() - 1].is_infinite && z[z.size() - 1].emitter != x->emitter))
+                    continue;
+                close<TransportMode::Radiance>(walk, z);
+                const auto hit = join_hit(z, z.size(), *x->emitter, counts);
+                if (!hit) continue;
+
+                std::vector<const Vertex*> vertices;
+                for (int i = z.size() - 1; i >= 0; --i) vertices.push_back(&z[i]);
+                // x_0 of the definition has its emitter.
+                Vertex x0 = *vertices.front();
+                x0.emitter = x->emitter;
+                vertices.front() = &x0;
+                std::vector<bool> delta;
+                for (const Vertex* v : vertices) delta.push_back(v->is_delta);
+                delta.front() = false;
+                PathPdfs pdfs = evaluate_path(scene, vertices, delta).pdfs;
+                const EmitterHit e =
+                    x0.is_infinite
+                        ? x->emitter->eval_infinite(x0.p)
+                        : x->emitter->eval_surface(x0.ng, x0.uv, x0.location.prim, x0.wo);
+                const LampPoint lamp{.emitter = x->emitter,
+                                     .p = x0.p,
+                                     .ng = x0.ng,
+                                     .uv = x0.uv,
+                                     .prim = x0.location.prim,
+                                     .pdf = 1};
+                const double J = jacobian_of_differences(scene, z[t - 1], Vec3d(w), events, lamp),
+                             cosine = x0.is_infinite ? 1 : double(abs_dot(x0.ng, x0.wo));
+                double way = 1;
+                if (!x0.is_infinite) {
+                    way = 0;
+                    for (int i = t; i < z.size(); ++i) way += double(length(z[i].p - z[i - 1].p));
+                }
+                pdfs.specular_ratio = kSolutionShare * spread(J, way) *
+                                      double(x->emitter->selection_pmf) * double(e.pdf_y0) /
+                                      (double(f.pdf) * J * cosine);
+                const double of_x = mis_weight(pdfs, x->technique, counts),
+                             of_hit = mis_weight(pdfs, {Strategy::Hit, 0, z.size()}, counts);
+                const float beside = hit_beside_specular(scene, z, z.size(), *x->emitter, counts);
+                EXPECT_NEAR(double(x->mis_weight), of_x, 2e-3);
+                EXPECT_NEAR(double(hit->mis_weight * beside), of_hit, 2e-3);
+                EXPECT_NEAR(of_x + of_hit, 1, 1e-6) << "nothing else makes the path";
+                ++compared;
+            }
+        }
+    EXPECT_GT(compared, has_connections ? 3 : 50);
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, SpecularWeights,
+                         ::testing::Combine(::testing::ValuesIn(weight_cases()), ::testing::Bool()),
+                         [](const auto& p) {
+                             return std::string(std::get<0>(p.param).name) +
+                                    (std::get<1>(p.param) ? "_beside_connections" : "");
+                         });
+
+}  // namespace
+}  // namespace etendue
