@@ -170,6 +170,25 @@ void add_bsdfs(const Report& report, const Options& options, std::list<BsdfInput
              {"phong", R"(<bsdf type="phong"/>)"},
              {"principled", R"(<bsdf type="principled"><float name="roughness" value="0.4"/>
                               <float name="metallic" value="0.3"/></bsdf>)"},
+             {"principled, dielectric",
+              R"(<bsdf type="principled"><float name="roughness" value="0.4"/></bsdf>)"},
+             {"principled, metal", R"(<bsdf type="principled"><float name="roughness" value="0.4"/>
+                                     <float name="metallic" value="1"/></bsdf>)"},
+             {"principled, glass", R"(<bsdf type="principled"><float name="roughness" value="0.4"/>
+                                     <float name="spec_trans" value="1"/></bsdf>)"},
+             {"openpbr", R"(<bsdf type="openpbr"><float name="specular_roughness" value="0.4"/>
+                           <float name="base_metalness" value="0.3"/></bsdf>)"},
+             {"openpbr, dielectric",
+              R"(<bsdf type="openpbr"><float name="specular_roughness" value="0.4"/></bsdf>)"},
+             {"openpbr, metal",
+              R"(<bsdf type="openpbr"><float name="specular_roughness" value="0.4"/>
+                <float name="base_metalness" value="1"/></bsdf>)"},
+             {"openpbr, glass",
+              R"(<bsdf type="openpbr"><float name="specular_roughness" value="0.4"/>
+                <float name="transmission_weight" value="1"/></bsdf>)"},
+             {"openpbr, coated",
+              R"(<bsdf type="openpbr"><float name="specular_roughness" value="0.4"/>
+                <float name="coat_weight" value="1"/></bsdf>)"},
              {"blendbsdf",
               R"(<bsdf type="blendbsdf"><float name="weight" value="0.4"/><bsdf type="diffuse"/>
                              <bsdf type="roughconductor"/></bsdf>)"}}) {

@@ -84,9 +84,9 @@ def _metallic(node: Output, values: Values) -> Surface:
     if node.node.fresnel_type == "F82":
         color, edge = values.color(node.input("Base Color")), values.color(node.input("Edge Tint"))
         if is_texture(color) or is_texture(edge):
-            values.warn(node, "Edge Tint has no effect beside a texture")
-            bsdf = {"type": "principled", "metallic": 1.0, "roughness": parameter(roughness), "base_color": parameter(color)}
-            return with_normal(glossy(bsdf, color, roughness, node), node, values)
+            bsdf = {"type": "openpbr", "base_metalness": 1.0, "specular_roughness": parameter(roughness), "base_color": parameter(color),
+                    "specular_color": parameter(edge)}
+            return with_normal(Surface(reflecting(bsdf)), node, values)
         # The tint is a factor of Schlick's reflectance at 82 degrees.
         pairs = [conductor(c, (c + (1 - c) * (6 / 7) ** 5) * t) for c, t in zip(color, edge)]
         eta, k = (tuple(pair[i] for pair in pairs) for i in (0, 1))

@@ -1,95 +1,113 @@
-"""Blender's Principled BSDF as a blend of etendue's models.
-
-The structure is Blender's: metal, or else glass, or else a dielectric surface over a diffuse base, under a clear coat. In
-Blender the diffuse base loses what the rough surface reflects toward the viewer. Here it is that of `plastic`, which loses
-what a smooth surface reflects, times a factor with which it loses as much as in Blender on average.
+"""Blender's Principled BSDF as etendue's `openpbr`, of which the structure is the same: metal, glass, or a dielectric surface over
+a diffuse base, under a clear coat and sheen.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-from .albedos import mean_reflectance, microfacets, schlick_mean, several_times
+from .albedos import mean_reflectance
 from .nodes import Output
-from .surfaces import (Surface, dielectric, diffuse, glass_gain, glossy, mixed, reflecting, rough, scatters_again,
-                       weighted_sum, with_normal)
-from .values import Value, Values, as_color, is_black, is_texture, luminance, parameter, product
+from .surfaces import Surface, reflecting, rough, weighted_sum, with_normal
+from .values import Color, Value, Values, as_color, is_texture, parameter, product
 
-_LEFT_OUT = ("Subsurface Weight", "Sheen Weight", "Thin Film Thickness", "Diffuse Roughness", "Anisotropic Rotation")
+_LEFT_OUT = ("Subsurface Weight", "Thin Film Thickness", "Anisotropic Rotation")
 
 
 def principled(node: Output, values: Values) -> Surface:
     for name in _LEFT_OUT:
         if node.has(name) and (node.input(name).source() or node.input(name).value):
             values.warn(node, f"{name} has no effect")
-    color, roughness = values.color(node.input("Base Color")), values.number(node.input("Roughness"))
-    metallic, glass = values.number(node.input("Metallic")), values.number(node.input("Transmission Weight"))
-    surface = mixed(glass, _plastic(node, values, color, roughness), _glass(node, values, color, roughness))
-    surface = mixed(metallic, surface, _metal(node, values, color, roughness))
-    surface = _coated(node, values, with_normal(surface, node, values))
+    color = _bounded(values.color(node.input("Base Color")))
+    glass = values.number(node.input("Transmission Weight"))
+    bsdf = {
+        "type": "openpbr",
+        "base_color": parameter(color),
+        "base_metalness": values.number(node.input("Metallic")),
+        "specular_color": parameter(values.color(node.input("Specular Tint"))),
+        "specular_ior": max(values.constant(node.input("IOR"), node), 0.01),
+        **_facets(node, values),
+        "transmission_weight": glass,
+        "transmission_color": parameter(color),
+        **_sheen(node, values),
+    }
+    if node.has("Diffuse Roughness"):
+        bsdf["base_diffuse_roughness"] = min(max(values.constant(node.input("Diffuse Roughness"), node), 0.0), 1.0)
+    # The level is a factor of the reflectance along the normal, except of glass.
+    if glass != 1.0:
+        bsdf["specular_weight"] = product(values.number(node.input("Specular IOR Level")), 2.0)
+    coat = values.number(node.input("Coat Weight"))
+    # A coat has normals of its own.
+    has_own_normal = is_texture(coat) or coat > 0
+    has_own_normal = has_own_normal and any(node.input(name).source() for name in ("Normal", "Coat Normal"))
+    if not has_own_normal:
+        bsdf.update(_coat(node, values, coat))
+    surface = with_normal(Surface(reflecting(bsdf) if glass == 0.0 else bsdf), node, values)
+    if has_own_normal:
+        surface = _below_a_coat(node, values, surface)
     surface.emission = product(values.color(node.input("Emission Color")), values.number(node.input("Emission Strength")))
     surface.opacity = values.number(node.input("Alpha"))
     return surface
 
 
-def _plastic(node: Output, values: Values, color: Value, roughness: Value) -> Surface:
-    """A dielectric surface over a diffuse base; its reflectance at normal incidence is a multiple of that of the index."""
-    level, ior = (values.constant(node.input(n), node) for n in ("Specular IOR Level", "IOR"))
-    root = math.sqrt(min(((ior - 1) / (ior + 1)) ** 2 * 2 * max(level, 0.0), 0.98))
-    tint = values.color(node.input("Specular Tint"))
-    if root == 0 or is_black(tint):
-        return diffuse(color)
-    eta, facets = (1 + root) / (1 - root), rough(roughness, node, values)
-    base = {"type": "plastic", "diffuse_reflectance": parameter(color), "int_ior": eta, "ext_ior": 1.0}
-    if not facets:
-        return Surface(reflecting({**base, "specular_reflectance": parameter(tint)}))
-    base = reflecting({**base, "specular_reflectance": 0.0})
-    smooth, share, gain = mean_reflectance(eta), 1.0, 1.0
-    if not is_texture(roughness):
-        gain = several_times(smooth, roughness**2) if scatters_again(roughness, node) else 1.0
-        lost = microfacets(roughness**2, eta)[0] * gain * (1.0 if is_texture(tint) else luminance(tint))
-        share = (1 - lost) / (1 - smooth)
-    return Surface(weighted_sum([(share, base), (gain, _reflection(eta, facets, tint))]))
+def _bounded(color: Value) -> Value:
+    return color if is_texture(color) else tuple(min(max(c, 0.0), 1.0) for c in as_color(color))
 
 
-def _reflection(eta: float, facets: dict[str, Any], tint: Value = 1.0) -> dict[str, Any]:
-    """The reflection of a dielectric surface alone, rough or, without parameters of facets, smooth."""
-    factors = {"diffuse_reflectance": 0.0, "glossy_reflectance": 0.0}
-    factors["glossy_reflectance" if facets else "specular_reflectance"] = parameter(tint)
-    return {"type": "lobesum", **facets, "eta": eta, **factors}
+def _facets(node: Output, values: Values) -> dict[str, Any]:
+    """In Blender the ratio of the roughnesses α across and along is 1 - 0.9 · Anisotropic and their product that without it;
+    here their mean square is."""
+    roughness, anisotropy = values.number(node.input("Roughness")), values.constant(node.input("Anisotropic"), node)
+    if anisotropy <= 0:
+        return {"specular_roughness": _unit(roughness)}
+    ratio = 1 - 0.9 * min(anisotropy, 1.0)
+    wider = product(roughness, ((ratio + 1 / ratio) / 2) ** 0.25)
+    return {"specular_roughness": _unit(wider), "specular_roughness_anisotropy": 1 - ratio}
 
 
-def _metal(node: Output, values: Values, color: Value, roughness: Value) -> Surface:
-    """Microfacets with Schlick's approximation of the Fresnel term."""
-    parameters = {"metallic": 1.0, "base_color": parameter(color), "roughness": parameter(roughness)}
-    anisotropy = values.constant(node.input("Anisotropic"), node)
-    if anisotropy:
-        parameters["anisotropic"] = anisotropy
-    mean = color if is_texture(color) else tuple(schlick_mean(c) for c in color)
-    return glossy({"type": "principled", **parameters}, mean, roughness, node)
+def _unit(value: Value) -> Value:
+    return value if is_texture(value) else min(max(value, 0.0), 1.0)
 
 
-def _glass(node: Output, values: Values, color: Value, roughness: Value) -> Surface:
-    """Glass whose transmission has the square root of the colour, since light passes two surfaces."""
-    ior = values.constant(node.input("IOR"), node)
-    if is_texture(color):
-        parameters = {"spec_trans": 1.0, "base_color": color, "roughness": parameter(roughness), "eta": ior}
-        return Surface({"type": "principled", **parameters})
-    gain = glass_gain(ior, roughness, node)
-    root = tuple(math.sqrt(max(c, 0.0)) * gain for c in color)
-    return Surface(dielectric(ior, rough(roughness, node, values), gain, root))
+def _constant_color(name: str, node: Output, values: Values) -> Color:
+    value = values.color(node.input(name))
+    if is_texture(value):
+        values.warn(node, f"{name} cannot be a texture")
+        value = as_color(node.input(name).value)
+    return _bounded(value)
 
 
-def _coated(node: Output, values: Values, base: Surface) -> Surface:
-    """A clear coat: its reflection is added, and the base loses the mean reflectance of the coat."""
-    weight = values.constant(node.input("Coat Weight"), node)
-    if weight <= 0:
-        return base
-    if as_color(node.input("Coat Tint").value) != (1.0, 1.0, 1.0) or node.input("Coat Tint").source():
-        values.warn(node, "Coat Tint has no effect")
+def _coat(node: Output, values: Values, weight: Value) -> dict[str, Any]:
+    if weight == 0.0:
+        return {}
+    return {
+        "coat_weight": _unit(weight),
+        "coat_color": parameter(_constant_color("Coat Tint", node, values)),
+        "coat_roughness": _unit(values.constant(node.input("Coat Roughness"), node)),
+        "coat_ior": max(values.constant(node.input("Coat IOR"), node), 1.0),
+    }
+
+
+def _sheen(node: Output, values: Values) -> dict[str, Any]:
+    weight = values.number(node.input("Sheen Weight"))
+    if weight == 0.0:
+        return {}
+    return {
+        "fuzz_weight": _unit(weight),
+        "fuzz_color": parameter(_constant_color("Sheen Tint", node, values)),
+        "fuzz_roughness": _unit(values.constant(node.input("Sheen Roughness"), node)),
+    }
+
+
+def _below_a_coat(node: Output, values: Values, base: Surface) -> Surface:
+    """A clear coat with other normals: its reflection is added, and the base loses the mean reflectance of the coat."""
+    weight = min(values.constant(node.input("Coat Weight"), node), 1.0)
+    if _constant_color("Coat Tint", node, values) != (1.0, 1.0, 1.0):
+        values.warn(node, "Coat Tint has no effect beside a linked normal")
     ior, roughness = values.constant(node.input("Coat IOR"), node), values.number(node.input("Coat Roughness"))
-    coat = Surface(_reflection(ior, rough(roughness, node, values)))
-    coated = with_normal(coat, node, values, "Coat Normal")
-    base.bsdf = weighted_sum([(1 - weight * mean_reflectance(ior), base.bsdf), (weight, coated.bsdf)])
+    facets = rough(roughness, node, values)
+    factors = {"diffuse_reflectance": 0.0, "glossy_reflectance": 0.0}
+    factors["glossy_reflectance" if facets else "specular_reflectance"] = 1.0
+    coat = with_normal(Surface({"type": "lobesum", **facets, "eta": ior, **factors}), node, values, "Coat Normal")
+    base.bsdf = weighted_sum([(1 - weight * mean_reflectance(ior), base.bsdf), (weight, coat.bsdf)])
     return base

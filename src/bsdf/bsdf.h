@@ -11,6 +11,7 @@
 #include "bsdf/diffuse.h"
 #include "bsdf/diffusetransmission.h"
 #include "bsdf/fresnelblend.h"
+#include "bsdf/openpbr.h"
 #include "bsdf/orennayar.h"
 #include "bsdf/phong.h"
 #include "bsdf/plastic.h"
@@ -23,10 +24,11 @@
 namespace etendue {
 
 /// The closed set of lobes; trivially copyable, at most 64 bytes each.
-using Lobe = std::variant<DiffuseLobe, ConductorLobe, RoughConductorLobe, DielectricLobe,
-                          ThinDielectricLobe, RoughDielectricLobe, PlasticLobe, RoughPlasticLobe,
-                          PhongLobe, PrincipledLobe, OrenNayarLobe, FresnelBlendLobe,
-                          DiffuseTransmissionLobe, CoatedMirrorLobe, CoatedConductorLobe>;
+using Lobe =
+    std::variant<DiffuseLobe, ConductorLobe, RoughConductorLobe, DielectricLobe, ThinDielectricLobe,
+                 RoughDielectricLobe, PlasticLobe, RoughPlasticLobe, PhongLobe, PrincipledLobe,
+                 OrenNayarLobe, FresnelBlendLobe, DiffuseTransmissionLobe, CoatedMirrorLobe,
+                 CoatedConductorLobe, OpenPbrLobe>;
 
 /// One lobe in its shading frame; a mixture is a list of them.
 struct BsdfComponent {

@@ -17,6 +17,7 @@ MaterialEntry lobesum_entry();
 MaterialEntry diffusetransmission_entry();
 MaterialEntry phong_entry();
 MaterialEntry principled_entry();
+MaterialEntry openpbr_entry();
 MaterialEntry twosided_entry();
 MaterialEntry mask_entry();
 MaterialEntry blendbsdf_entry();
@@ -38,6 +39,7 @@ const std::vector<MaterialEntry>& material_registry() {
         coatedconductor_entry(),
         phong_entry(),
         principled_entry(),
+        openpbr_entry(),
         orennayar_entry(),
         fresnelblend_entry(),
         lobesum_entry(),

@@ -1,5 +1,5 @@
 #pragma once
-// Reader of glTF 2.0 scenes, .gltf and .glb. Materials become `principled`, and everything else what Mitsuba 3 has for
+// Reader of glTF 2.0 scenes, .gltf and .glb. Materials become `openpbr`, and everything else what Mitsuba 3 has for
 // it. What has no counterpart is a warning, or an error where the file requires it.
 
 #include <string>

@@ -1,5 +1,5 @@
-// Materials of glTF. Metallic-roughness is `principled`, whose roughness is defined in the same way; extensions that
-// glTF layers on it set the parameters of `principled` that come nearest.
+// Materials of glTF. Metallic-roughness is `openpbr`, whose roughness is defined in the same way; extensions that
+// glTF layers on it set the parameters of `openpbr` that come nearest.
 
 #include <algorithm>
 #include <cmath>
@@ -43,12 +43,6 @@ double ior(const JsonValue& m) {
     return eta == 0 ? 1e3 : std::max(eta, 1.0001);
 }
 
-bool has_specular_colour(const JsonValue& m) {
-    const JsonValue specular = extension(m, "KHR_materials_specular");
-    const Rgb tint = colour(specular["specularColorFactor"], Rgb(1));
-    return tint.max() > 0 && (!(tint == Rgb(tint.r)) || specular["specularColorTexture"]);
-}
-
 }  // namespace
 
 const GltfReader::Material& GltfReader::material(size_t index, VertexColors colors) {
@@ -70,11 +64,10 @@ GltfReader::Material GltfReader::read_material(const JsonValue& m, VertexColors 
         made.bsdf = add("bsdf", "diffuse", m);
         set_color(made.bsdf, "reflectance", base_color(m, colors));
     } else {
-        made.bsdf = add("bsdf", "principled", m);
-        read_principled(m, made.bsdf, colors);
+        made.bsdf = add("bsdf", "openpbr", m);
+        read_surface(m, made.bsdf, colors);
     }
     const bool transmits = transmission(m) > 0;
-    if (transmits && !has_volume(m)) made.bsdf = thin_glass(m, made.bsdf, colors);
     if (const JsonValue normals = m["normalTexture"]) {
         if (const int image = bitmap(normals, true); image >= 0) {
             const int map = add("bsdf", "normalmap", normals);
@@ -99,74 +92,72 @@ GltfReader::Material GltfReader::read_material(const JsonValue& m, VertexColors 
     return made;
 }
 
-void GltfReader::read_principled(const JsonValue& m, int principled, VertexColors colors) {
+void GltfReader::read_surface(const JsonValue& m, int surface, VertexColors colors) {
     if (const JsonValue old = extension(m, "KHR_materials_pbrSpecularGlossiness"))
-        return read_specular_glossiness(old, principled, colors);
+        return read_specular_glossiness(old, surface, colors);
     const JsonValue pbr = m["pbrMetallicRoughness"];
     const JsonValue metal_and_rough = pbr["metallicRoughnessTexture"];
-    const double metallic = pbr["metallicFactor"].number(1, 0, 1);
-    const Color base = base_color(m, colors);
-    if (metallic == 0 && transmission(m) == 0 && has_specular_colour(m)) {
-        set_diffuse_and_specular(principled, base, specular_colour(m), m);
-    } else {
-        set_color(principled, "base_color", base);
-        set_scalar(principled, "metallic", metallic, metal_and_rough, "b");
-        set(principled, "eta", ior(m));
-        if (const JsonValue specular = extension(m, "KHR_materials_specular")) {
-            set_scalar(principled, "specular_weight", specular["specularFactor"].number(1, 0, 1),
-                       specular["specularTexture"], "opacity");
-            Color tint{colour(specular["specularColorFactor"], Rgb(1))};
-            if (tint.factor.max() > 0)
-                tint.texture = bitmap(specular["specularColorTexture"], false);
-            set_color(principled, "specular_color", tint);
-            if (has_specular_colour(m))
-                warn(fmt::format("{}: of the specular colour the luminance is used",
-                                 specular.path()));
+    set_color(surface, "base_color", base_color(m, colors));
+    set_scalar(surface, "base_metalness", pbr["metallicFactor"].number(1, 0, 1), metal_and_rough,
+               "b");
+    set(surface, "specular_ior", ior(m));
+    if (const JsonValue specular = extension(m, "KHR_materials_specular")) {
+        set_scalar(surface, "specular_weight", specular["specularFactor"].number(1, 0, 1),
+                   specular["specularTexture"], "opacity");
+        Color tint{colour(specular["specularColorFactor"], Rgb(1))};
+        if (tint.factor.max() > 0) tint.texture = bitmap(specular["specularColorTexture"], false);
+        set_color(surface, "specular_color", tint);
+    }
+    const double roughness = pbr["roughnessFactor"].number(1, 0, 1);
+    if (const JsonValue brushed = extension(m, "KHR_materials_anisotropy"))
+        read_anisotropy(brushed, surface, roughness, metal_and_rough);
+    else
+        set_scalar(surface, "specular_roughness", roughness, metal_and_rough, "g");
+    if (const double t = transmission(m); t > 0) {
+        set_scalar(surface, "transmission_weight", t,
+                   extension(m, "KHR_materials_transmission")["transmissionTexture"], "r");
+        set_color(surface, "transmission_color", base_color(m, colors));
+        if (!has_volume(m)) {
+            set(surface, "thin_walled", true);
+            if (roughness > 0.1)
+                warn(fmt::format("{}: transmission without volume is clear, whatever the roughness",
+                                 m.path()));
         }
     }
-    set_scalar(principled, "roughness", pbr["roughnessFactor"].number(1, 0, 1), metal_and_rough,
-               "g");
-    if (const double t = transmission(m); t > 0 && has_volume(m))
-        set_scalar(principled, "spec_trans", t,
-                   extension(m, "KHR_materials_transmission")["transmissionTexture"], "r");
     if (const JsonValue coat = extension(m, "KHR_materials_clearcoat")) {
-        set_scalar(principled, "clearcoat", coat["clearcoatFactor"].number(0, 0, 1),
+        set_scalar(surface, "coat_weight", coat["clearcoatFactor"].number(0, 0, 1),
                    coat["clearcoatTexture"], "r");
-        // The gloss from 0 to 1 is an α from 0.1 to 0.001.
-        const double alpha = std::pow(coat["clearcoatRoughnessFactor"].number(0, 0, 1), 2);
-        set(principled, "clearcoat_gloss", std::clamp((0.1 - alpha) / 0.099, 0.0, 1.0));
+        set(surface, "coat_roughness", coat["clearcoatRoughnessFactor"].number(0, 0, 1));
+        set(surface, "coat_ior", 1.5);
         for (const char* name : {"clearcoatRoughnessTexture", "clearcoatNormalTexture"})
             if (coat[name]) warn(fmt::format("{}: has no effect", coat[name].path()));
     }
     if (const JsonValue cloth = extension(m, "KHR_materials_sheen")) {
-        const Rgb c = colour(cloth["sheenColorFactor"], Rgb(0));
-        set_scalar(principled, "sheen", std::min(c.max(), 1.0f), cloth["sheenColorTexture"], "all");
-        if (c.max() > 0 && !(c.r == c.g && c.g == c.b)) set(principled, "sheen_tint", Rgb(1));
-    }
-    if (const JsonValue brushed = extension(m, "KHR_materials_anisotropy")) {
-        set_scalar(principled, "anisotropic", brushed["anisotropyStrength"].number(0, 0, 1),
-                   brushed["anisotropyTexture"], "b");
-        if (brushed["anisotropyRotation"].number(0) != 0 || brushed["anisotropyTexture"])
-            warn(fmt::format("{}: the direction has no effect", brushed.path()));
+        const Rgb c = clamped(colour(cloth["sheenColorFactor"], Rgb(0)));
+        set_scalar(surface, "fuzz_weight", double(c.max()), cloth["sheenColorTexture"], "all");
+        if (c.max() > 0) set(surface, "fuzz_color", c / c.max());
+        set(surface, "fuzz_roughness", cloth["sheenRoughnessFactor"].number(0, 0, 1));
+        if (const JsonValue t = cloth["sheenRoughnessTexture"])
+            warn(fmt::format("{}: has no effect", t.path()));
     }
 }
 
-/// The reflectance at normal incidence.
-GltfReader::Color GltfReader::specular_colour(const JsonValue& m) {
-    const JsonValue specular = extension(m, "KHR_materials_specular");
-    const double n = ior(m), F0 = (n - 1) * (n - 1) / ((n + 1) * (n + 1)),
-                 weight = specular["specularFactor"].number(1, 0, 1);
-    Color made{colour(specular["specularColorFactor"], Rgb(1)) * float(F0 * weight)};
-    if (made.factor.max() == 0) return made;
-    const int tint = bitmap(specular["specularColorTexture"], false),
-              share = bitmap(specular["specularTexture"], true, "opacity");
-    made.texture = tint >= 0 && share >= 0 ? product(tint, share) : std::max(tint, share);
-    return made;
+/// The roughness α along the bitangent, and α + (1 − α) strength² along the tangent, by their ratio and their mean square.
+void GltfReader::read_anisotropy(const JsonValue& brushed, int surface, double roughness,
+                                 const JsonValue& texture) {
+    const double strength = brushed["anisotropyStrength"].number(0, 0, 1),
+                 across = roughness * roughness,
+                 along = across + (1 - across) * strength * strength,
+                 mean = std::sqrt(std::sqrt((along * along + across * across) / 2));
+    set_scalar(surface, "specular_roughness", mean, texture, "g");
+    if (along > 0) set(surface, "specular_roughness_anisotropy", 1 - across / along);
+    if (brushed["anisotropyRotation"].number(0) != 0 || brushed["anisotropyTexture"])
+        warn(fmt::format("{}: the direction has no effect", brushed.path()));
 }
 
-/// Sets the parameters with which `principled` comes near to these colours.
-void GltfReader::set_diffuse_and_specular(int principled, const Color& diffuse,
-                                          const Color& specular, const JsonValue& where) {
+/// Sets the parameters with which `openpbr` comes near to these colours.
+void GltfReader::set_diffuse_and_specular(int surface, const Color& diffuse, const Color& specular,
+                                          const JsonValue& where) {
     const MetallicColor made = metallic_color(diffuse.factor, specular.factor);
     if (specular.texture >= 0 || (diffuse.texture >= 0 && made.metallic > 0)) {
         for (const char* output : {"base_color", "metallic", "specular_weight"}) {
@@ -174,22 +165,23 @@ void GltfReader::set_diffuse_and_specular(int principled, const Color& diffuse,
             set(part, "output", std::string(output));
             set_color(part, "diffuse", diffuse);
             set_color(part, "specular", specular);
-            add_child(principled, output, part);
+            add_child(surface, std::string_view(output) == "metallic" ? "base_metalness" : output,
+                      part);
         }
         return;
     }
-    set_color(principled, "base_color", {made.base, diffuse.texture});
-    set(principled, "metallic", double(made.metallic));
-    if (made.specular_weight < 1) set(principled, "specular_weight", double(made.specular_weight));
+    set_color(surface, "base_color", {made.base, diffuse.texture});
+    set(surface, "base_metalness", double(made.metallic));
+    if (made.specular_weight < 1) set(surface, "specular_weight", double(made.specular_weight));
 }
 
 /// The older workflow: diffuse and specular colours, and the glossiness 1 - √α.
-void GltfReader::read_specular_glossiness(const JsonValue& s, int principled, VertexColors colors) {
+void GltfReader::read_specular_glossiness(const JsonValue& s, int surface, VertexColors colors) {
     const JsonValue both = s["specularGlossinessTexture"];
     const Color diffuse = with_vertex_colors(s["diffuseFactor"], s["diffuseTexture"], colors);
     Color specular{clamped(colour(s["specularFactor"], Rgb(1)))};
     if (specular.factor.max() > 0) specular.texture = bitmap(both, false);
-    set_diffuse_and_specular(principled, diffuse, specular, s);
+    set_diffuse_and_specular(surface, diffuse, specular, s);
     const double glossiness = s["glossinessFactor"].number(1, 0, 1);
     const int gloss = bitmap(both, true, "opacity");
     if (gloss >= 0) {
@@ -197,9 +189,9 @@ void GltfReader::read_specular_glossiness(const JsonValue& s, int principled, Ve
         set(rough, "value0", 1.0);
         set(rough, "value1", 1 - glossiness);
         add_child(rough, "weight", gloss);
-        add_child(principled, "roughness", rough);
+        add_child(surface, "specular_roughness", rough);
     } else {
-        set(principled, "roughness", 1 - glossiness);
+        set(surface, "specular_roughness", 1 - glossiness);
     }
 }
 
@@ -231,34 +223,6 @@ int GltfReader::product(int a, int b) {
     add_child(both, "value", a);
     add_child(both, "scale", b);
     return both;
-}
-
-/// A surface without volume does not refract: it is a pane of glass, coloured by the base colour.
-int GltfReader::thin_glass(const JsonValue& m, int principled, VertexColors colors) {
-    const JsonValue pbr = m["pbrMetallicRoughness"];
-    if (pbr["roughnessFactor"].number(1, 0, 1) > 0.1)
-        warn(fmt::format("{}: transmission without volume is clear, whatever the roughness",
-                         m.path()));
-    const int pane = add("bsdf", "thindielectric", m);
-    set(pane, "int_ior", ior(m));
-    set(pane, "ext_ior", 1.0);
-    if (const JsonValue specular = extension(m, "KHR_materials_specular")) {
-        const Rgb weight = colour(specular["specularColorFactor"], Rgb(1)) *
-                           float(specular["specularFactor"].number(1, 0, 1));
-        if (!(weight == Rgb(1))) set(pane, "specular_reflectance", clamped(weight));
-        for (const char* name : {"specularTexture", "specularColorTexture"})
-            if (specular[name])
-                warn(fmt::format("{}: has no effect on the pane", specular[name].path()));
-    }
-    set_color(pane, "specular_transmittance", base_color(m, colors));
-    const int opaque = add("bsdf", "twosided", m);
-    add_child(opaque, "", principled);
-    const int blend = add("bsdf", "blendbsdf", m);
-    set_scalar(blend, "weight", transmission(m),
-               extension(m, "KHR_materials_transmission")["transmissionTexture"], "r");
-    add_child(blend, "", opaque);
-    add_child(blend, "", pane);
-    return blend;
 }
 
 void GltfReader::read_volume(const JsonValue& m, Material& made) {

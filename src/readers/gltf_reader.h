@@ -66,7 +66,9 @@ private:
     // Materials and textures: gltf_materials.cpp.
     const Material& material(size_t index, VertexColors colors);
     Material read_material(const JsonValue& m, VertexColors colors);
-    void read_principled(const JsonValue& m, int principled, VertexColors colors);
+    void read_surface(const JsonValue& m, int surface, VertexColors colors);
+    void read_anisotropy(const JsonValue& brushed, int surface, double roughness,
+                         const JsonValue& texture);
     int vertex_attribute(const char* name);
     int product(int a, int b);
     /// A factor, times a texture unless that is -1.
@@ -78,10 +80,9 @@ private:
     Color with_vertex_colors(const JsonValue& factor, const JsonValue& texture,
                              VertexColors colors);
     void set_color(int object, const char* name, const Color& color);
-    Color specular_colour(const JsonValue& m);
-    void set_diffuse_and_specular(int principled, const Color& diffuse, const Color& specular,
+    void set_diffuse_and_specular(int surface, const Color& diffuse, const Color& specular,
                                   const JsonValue& where);
-    void read_specular_glossiness(const JsonValue& s, int principled, VertexColors colors);
+    void read_specular_glossiness(const JsonValue& s, int surface, VertexColors colors);
     void apply_opacity(const JsonValue& m, Material& made, VertexColors colors);
     /// The product of the factors of alpha; a constant where there is no texture.
     struct Alpha {
@@ -91,7 +92,6 @@ private:
     Alpha alpha(const JsonValue& m, VertexColors colors);
     void read_emission(const JsonValue& m, Material& made);
     void read_volume(const JsonValue& m, Material& made);
-    int thin_glass(const JsonValue& m, int principled, VertexColors colors);
     /// The bitmap that a textureInfo names; -1 where it is absent.
     int bitmap(const JsonValue& info, bool raw, const char* channel = nullptr);
     /// Sets `name` of `object` to a factor, times the channel of a texture where there is one.

@@ -44,6 +44,14 @@ void replace_absorption(PlainScene& s, SceneObject& o) {
     set(o, "diffuse_reflectance", base);
 }
 
+/// Makes a parameter or texture of `from` one of `to`.
+void move(SceneObject& from, std::string_view name, SceneObject& to, const std::string& new_name) {
+    if (const Param* p = from.find(name)) to.params.push_back({new_name, p->value, p->where});
+    for (const auto& c : from.children)
+        if (c.name == name) to.children.push_back({new_name, c.object, c.where});
+    remove(from, name);
+}
+
 /// The reflectance at normal incidence becomes an index of refraction.
 void replace_own_reflectance(PlainScene& s, SceneObject& o) {
     if (!has(o, "specular_weight") && !has(o, "specular_color")) return;
@@ -55,11 +63,79 @@ void replace_own_reflectance(PlainScene& s, SceneObject& o) {
     const double F0 = o.find("specular") ? 0.08 * specular : std::pow((eta - 1) / (eta + 1), 2);
     const double root =
         std::sqrt(std::clamp(F0 * factor("specular_weight") * factor("specular_color"), 0.0, 0.98));
-    s.warn(o, "Mitsuba 3 has no parameters \"specular_weight\" and \"specular_color\" of bsdf "
-              "\"principled\": an index of refraction with their mean reflectance at normal "
-              "incidence stands in for them");
+    if (!s.is_stand_in(s.index_of(o)))
+        s.warn(o, "Mitsuba 3 has no parameters \"specular_weight\" and \"specular_color\" of bsdf "
+                  "\"principled\": an index of refraction with their mean reflectance at normal "
+                  "incidence stands in for them");
     for (const char* name : {"specular_weight", "specular_color", "specular"}) remove(o, name);
     set(o, "eta", std::max((1 + root) / (1 - root), 1.001));
+}
+
+bool is_zero(const SceneObject& o, std::string_view name) {
+    return !has_texture(o, name) && number(o, name, 0) == 0;
+}
+
+/// The nearest that Mitsuba 3 has: its principled model, of which energy is not conserved; a blend with a pane for thin
+/// glass.
+void replace_openpbr(PlainScene& s, int index) {
+    {
+        SceneObject& o = s.object(index);
+        const bool is_mixed_glass =
+            !is_zero(o, "transmission_weight") && has(o, "transmission_color");
+        s.stand_in(
+            o, "principled",
+            "white surfaces reflect 0.70 to 1.05 of the light instead of all of it, and colours "
+            "of the specular reflection, the coat and the fuzz are left out");
+        // The base colour is that of glass as well.
+        if (is_mixed_glass && !has_texture(o, "transmission_weight") &&
+            number(o, "transmission_weight", 0) == 1 && number(o, "base_metalness", 0) == 0 &&
+            !has_texture(o, "base_metalness")) {
+            remove(o, "base_color"), remove(o, "base_weight");
+            rename(o, "transmission_color", "base_color");
+        }
+        if (!has(o, "base_color")) set(o, "base_color", Rgb(0.8f));
+        if (const double weight = number(o, "base_weight", 1);
+            weight != 1 && !has_texture(o, "base_color"))
+            set(o, "base_color", rgb(o, "base_color", Rgb(0.8f)) * float(weight));
+        rename(o, "base_metalness", "metallic");
+        rename(o, "specular_roughness", "roughness");
+        if (!has(o, "roughness")) set(o, "roughness", 0.3);
+        rename(o, "specular_ior", "eta");
+        if (!has(o, "eta")) set(o, "eta", 1.5);
+        replace_own_reflectance(s, o);
+        // The ratio of the roughnesses along v and u is 1 − 0.9 anisotropic.
+        if (const double a = number(o, "specular_roughness_anisotropy", 0); a > 0)
+            set(o, "anisotropic", std::min(a / 0.9, 1.0));
+        if (has(o, "coat_weight")) {
+            // The gloss from 0 to 1 is an α from 0.1 to 0.001.
+            const double alpha = std::pow(number(o, "coat_roughness", 0), 2);
+            rename(o, "coat_weight", "clearcoat");
+            set(o, "clearcoat_gloss", std::clamp((0.1 - alpha) / 0.099, 0.0, 1.0));
+        }
+        rename(o, "fuzz_weight", "sheen");
+        const Param* thin = o.find("thin_walled");
+        const bool is_thin =
+            thin && std::get<bool>(thin->value) && !is_zero(o, "transmission_weight");
+        if (!is_thin) rename(o, "transmission_weight", "spec_trans");
+        for (const char* name : {"base_weight", "base_diffuse_roughness",
+                                 "specular_roughness_anisotropy", "coat_color", "coat_roughness",
+                                 "coat_ior", "fuzz_color", "fuzz_roughness", "thin_walled"})
+            remove(o, name);
+        if (!is_thin) return remove(o, "transmission_color");
+    }
+    SceneObject opaque = s.object(index);
+    SceneObject pane{"bsdf", "thindielectric", "", opaque.where, {}, {}},
+        blend{"bsdf", "blendbsdf", opaque.id, opaque.where, {}, {}},
+        both_sides{"bsdf", "twosided", "", opaque.where, {}, {}};
+    set(pane, "int_ior", number(opaque, "eta", 1.5));
+    set(pane, "ext_ior", 1.0);
+    move(opaque, "transmission_color", pane, "specular_transmittance");
+    move(opaque, "transmission_weight", blend, "weight");
+    opaque.id.clear();
+    both_sides.children = {{"", s.add(std::move(opaque)), blend.where}};
+    blend.children.push_back({"", s.add(std::move(both_sides)), blend.where});
+    blend.children.push_back({"", s.add(std::move(pane)), blend.where});
+    s.object(index) = std::move(blend);
 }
 
 void set_ior(SceneObject& o, double ior) {
@@ -134,6 +210,7 @@ void replace_bsdf(PlainScene& s, int index) {
         for (const char* name : {"flip_invalid_normals", "use_shadowing_function"})
             set(s.object(index), name, false);
     if (s.object(index).type == "mixturebsdf") return replace_mixture(s, index);
+    if (s.object(index).type == "openpbr") return replace_openpbr(s, index);
     SceneObject& o = s.object(index);
     if (o.type == "orennayar") {
         s.stand_in(o, "diffuse");

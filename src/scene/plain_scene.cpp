@@ -47,9 +47,9 @@ void PlainScene::warn(const SceneObject& o, const std::string& message) {
         warnings_.push_back(line);
 }
 
-void PlainScene::stand_in(SceneObject& o, const std::string& type) {
-    warn(o, fmt::format("Mitsuba 3 has no {0} \"{1}\": {0} \"{2}\" stands in for it", o.category,
-                        o.type, type));
+void PlainScene::stand_in(SceneObject& o, const std::string& type, const std::string& difference) {
+    warn(o, fmt::format("Mitsuba 3 has no {0} \"{1}\": {0} \"{2}\" stands in for it{3}{4}",
+                        o.category, o.type, type, difference.empty() ? "" : "; ", difference));
     o.type = type;
     stand_ins_.insert(index_of(o));
 }

@@ -32,8 +32,8 @@ public:
     void set_image(SceneObject& o, std::string bytes);
     /// An approximation, at the place of `o` in the scene file; each is reported once.
     void warn(const SceneObject& o, const std::string& message);
-    /// `o` becomes `type`, which is not the same.
-    void stand_in(SceneObject& o, const std::string& type);
+    /// `o` becomes `type`, which is not the same; `difference` tells what differs.
+    void stand_in(SceneObject& o, const std::string& type, const std::string& difference = {});
     /// Whether it has been reported that the object is replaced.
     bool is_stand_in(int index) const { return stand_ins_.count(index) > 0; }
     std::vector<std::string> take_warnings() { return std::move(warnings_); }

@@ -1,4 +1,4 @@
-// A material of diffuse and specular colours, such as the older one of glTF, in the parameters of `principled`.
+// A material of diffuse and specular colours, such as the older one of glTF, in the parameters of `principled` and `openpbr`.
 //   diffuse (1), specular (1)   colours or textures
 //   output (base_color)         or metallic, specular_weight: which parameter the texture is
 
@@ -51,11 +51,11 @@ private:
 TextureEntry specular_to_metallic_entry() {
     return {{"texture",
              "specular_to_metallic",
-             "A diffuse and a specular colour in the parameters of principled.",
+             "A diffuse and a specular colour in the parameters of principled and openpbr.",
              {{"diffuse", ParamKind::Texture, "1", "The diffuse colour."},
               {"specular", ParamKind::Texture, "1", "The reflectance at normal incidence."},
               {"output", ParamKind::String, "base_color",
-               "Parameter of principled that the texture is: base_color, metallic or "
+               "Parameter that the texture is: base_color, metallic (base_metalness) or "
                "specular_weight."}}},
             [](const Params& params, TextureContext& context) -> std::unique_ptr<Texture> {
                 return std::make_unique<SpecularToMetallic>(params, context);

@@ -6,7 +6,7 @@ import pytest
 from studio import SIZE, looking
 
 PRINCIPLED = "ShaderNodeBsdfPrincipled"
-COLOR = (0.8, 0.4, 0.2)
+COLOR, WHITE = (0.8, 0.4, 0.2), (1.0, 1.0, 1.0)
 
 # name: node, inputs, distribution, light, and the ratio to Cycles where the models differ (docs/blender.md says why).
 NODES = {
@@ -36,8 +36,14 @@ NODES = {
     "principled, multiscatter": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5), "MULTI_GGX", "world", 1),
     "principled, rough": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=1.0), "MULTI_GGX", "world", 1),
     "principled, black": (PRINCIPLED, dict(Base_Color=(0.0, 0.0, 0.0), Roughness=0.7), "MULTI_GGX", "world", 1.04),
-    "principled rough glass": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.4, Transmission_Weight=1.0), "MULTI_GGX", "world", 0.97),
-    "principled rough metal": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=1.0, Metallic=1.0), "MULTI_GGX", "world", 1),
+    "principled rough glass": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.4, Transmission_Weight=1.0), "MULTI_GGX", "world", 1.03),
+    "principled white glass": (PRINCIPLED, dict(Base_Color=WHITE, Roughness=0.4, Transmission_Weight=1.0), "MULTI_GGX", "world", 1.01),
+    "principled half glass": (PRINCIPLED, dict(Base_Color=WHITE, Roughness=0.5, Transmission_Weight=0.5), "MULTI_GGX", "world", 1.02),
+    "principled coat, tinted": (PRINCIPLED, dict(Base_Color=COLOR, Coat_Weight=1.0, Coat_Tint=(0.5, 0.8, 1.0), Coat_Roughness=0.3), "MULTI_GGX", "world", 1),
+    "principled sheen": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5, Sheen_Weight=1.0), "MULTI_GGX", "world", 1.04),
+    "principled metal, tinted": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.3, Metallic=1.0, Specular_Tint=(0.3, 0.5, 0.9)), "MULTI_GGX", "world", 1),
+    "principled, anisotropic": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5, Metallic=1.0, Anisotropic=0.8), "MULTI_GGX", "world", 1.04),
+    "principled rough metal": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=1.0, Metallic=1.0), "MULTI_GGX", "world", 0.97),
     "principled glass": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.0, Transmission_Weight=1.0), "GGX", "world", 1),
     "principled alpha": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5, Alpha=0.5), "GGX", "world", 1),
     "principled emission": (PRINCIPLED, dict(Emission_Color=COLOR, Emission_Strength=2.0), "GGX", None, 1),

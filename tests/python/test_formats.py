@@ -137,9 +137,9 @@ def xml(folder: Path) -> et.Description:
         color = f'<rgb name="base_color" value="{", ".join(map(str, m["color"]))}"/>'
         if "image" in m:
             color = '<texture name="base_color" type="bitmap"><string name="filename" value="picture.png"/></texture>'
-        principled = f"""<bsdf type="principled">{color}<float name="metallic" value="{m["metallic"]}"/>
-            <float name="roughness" value="{m["roughness"]}"/><float name="eta" value="1.5"/></bsdf>"""
-        inner = f'<bsdf type="twosided">{principled}</bsdf>'
+        surface = f"""<bsdf type="openpbr">{color}<float name="base_metalness" value="{m["metallic"]}"/>
+            <float name="specular_roughness" value="{m["roughness"]}"/><float name="specular_ior" value="1.5"/></bsdf>"""
+        inner = f'<bsdf type="twosided">{surface}</bsdf>'
         if "opacity" in m:
             inner = f'<bsdf type="mask"><float name="opacity" value="{m["opacity"]}"/>{inner}</bsdf>'
         text += inner.replace("<bsdf ", f'<bsdf id="{name}" ', 1)

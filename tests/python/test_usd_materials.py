@@ -39,32 +39,32 @@ def material(inputs: str, nodes: str = "", shader: str = "UsdPreviewSurface", ou
     """
 
 
-def principled(folder: Path, inputs: str, nodes: str = "", **other: str) -> dict[str, object]:
+def surface(folder: Path, inputs: str, nodes: str = "", **other: str) -> dict[str, object]:
     bsdf = load(folder, CAMERA + SKY + material(inputs, nodes, **other))["/Quad.bsdf"]
-    while bsdf["type"] != "principled":
+    while bsdf["type"] != "openpbr":
         bsdf = bsdf["bsdf"]
     return bsdf
 
 
 def test_constants(tmp_path: Path) -> None:
-    p = principled(tmp_path, """color3f inputs:diffuseColor = (0.1, 0.2, 0.3)
+    p = surface(tmp_path, """color3f inputs:diffuseColor = (0.1, 0.2, 0.3)
         float inputs:metallic = 0.25
         float inputs:roughness = 0.75
         float inputs:ior = 1.25
         float inputs:clearcoat = 0.5
         float inputs:clearcoatRoughness = 0.3""")
     assert p["base_color"]["value"] == pytest.approx([0.1, 0.2, 0.3])
-    assert [p[n] for n in ("metallic", "roughness", "eta", "clearcoat")] == [0.25, 0.75, 1.25, 0.5]
-    # The gloss 0 is an α of 0.1, 1 one of 0.001; α is the square of the roughness.
-    assert p["clearcoat_gloss"] == pytest.approx((0.1 - 0.09) / 0.099)
-    plain = principled(tmp_path, "")
-    assert plain["base_color"]["value"] == pytest.approx([0.18] * 3) and plain["roughness"] == 0.5 and plain["eta"] == 1.5
+    names = ("base_metalness", "specular_roughness", "specular_ior", "coat_weight", "coat_roughness", "coat_ior")
+    assert [p[n] for n in names] == pytest.approx([0.25, 0.75, 1.25, 0.5, 0.3, 1.5])
+    plain = surface(tmp_path, "")
+    assert plain["base_color"]["value"] == pytest.approx([0.18] * 3) and plain["specular_roughness"] == 0.5 and plain["specular_ior"] == 1.5
     assert load(tmp_path, CAMERA + SKY + material(""))["/Quad.bsdf"]["type"] == "twosided"
 
 
 def test_the_specular_workflow(tmp_path: Path) -> None:
-    p = principled(tmp_path, "int inputs:useSpecularWorkflow = 1\ncolor3f inputs:specularColor = (0.9, 0.6, 0.3)")
-    assert p["metallic"] == {"type": "specular_to_metallic", "output": "metallic", **{n: p["metallic"][n] for n in ("diffuse", "specular")}}
+    p = surface(tmp_path, "int inputs:useSpecularWorkflow = 1\ncolor3f inputs:specularColor = (0.9, 0.6, 0.3)")
+    metal = p["base_metalness"]
+    assert metal == {"type": "specular_to_metallic", "output": "metallic", **{n: metal[n] for n in ("diffuse", "specular")}}
     image(load(tmp_path, CAMERA + SKY + material("int inputs:useSpecularWorkflow = 1")))
 
 
@@ -168,9 +168,9 @@ def test_transform_2d(tmp_path: Path) -> None:
 def test_single_channels(tmp_path: Path) -> None:
     png(tmp_path / "grey.png", np.array([[0, 128], [128, 255]]))
     nodes = texture("float4 inputs:scale = (0.5, 1, 1, 1)\nfloat4 inputs:bias = (0.25, 0, 0, 0)", file="grey.png")
-    p = principled(tmp_path, "float inputs:roughness.connect = </Paint/Image.outputs:r>", nodes)
-    assert (p["roughness"]["type"], p["roughness"]["value0"], p["roughness"]["value1"]) == ("mix", 0.25, 0.75)
-    assert p["roughness"]["weight"]["raw"] is True and p["roughness"]["weight"]["channel"] == "r"
+    p = surface(tmp_path, "float inputs:roughness.connect = </Paint/Image.outputs:r>", nodes)
+    assert (p["specular_roughness"]["type"], p["specular_roughness"]["value0"], p["specular_roughness"]["value1"]) == ("mix", 0.25, 0.75)
+    assert p["specular_roughness"]["weight"]["raw"] is True and p["specular_roughness"]["weight"]["channel"] == "r"
     cut = load(tmp_path, CAMERA + SKY + material(
         "float inputs:opacity.connect = </Paint/Image.outputs:a>\nfloat inputs:opacityThreshold = 0.5", texture(file="grey.png")))
     assert cut["/Quad.bsdf.opacity"]["type"] == "threshold" and cut["/Quad.bsdf.opacity.value.channel"] == "opacity"
@@ -269,7 +269,7 @@ OPEN_PBR = {"shader": "ND_open_pbr_surface_surfaceshader", "outputs": "outputs:m
 
 
 def test_standard_surface(tmp_path: Path) -> None:
-    p = principled(tmp_path, """float inputs:base = 0.5
+    p = surface(tmp_path, """float inputs:base = 0.5
         color3f inputs:base_color = (0.8, 0.4, 0.2)
         float inputs:metalness = 0.25
         float inputs:specular_roughness = 0.3
@@ -277,18 +277,29 @@ def test_standard_surface(tmp_path: Path) -> None:
         float inputs:coat = 1
         float inputs:sheen = 0.5""", **STANDARD)
     assert p["base_color"]["value"] == pytest.approx([0.4, 0.2, 0.1])
-    assert [p[n] for n in ("metallic", "roughness", "eta", "clearcoat", "sheen")] == pytest.approx([0.25, 0.3, 1.4, 1, 0.5])
+    names = ("base_metalness", "specular_roughness", "specular_ior", "coat_weight", "coat_ior", "fuzz_weight", "fuzz_roughness")
+    assert [p[n] for n in names] == pytest.approx([0.25, 0.3, 1.4, 1, 1.5, 0.5, 0.3])
     glass = load(tmp_path, CAMERA + SKY + material(
         "float inputs:transmission = 1\ncolor3f inputs:transmission_color = (0.5, 1, 0.5)", **STANDARD))["/Quad.bsdf"]
-    assert (glass["type"], glass["spec_trans"], glass["base_color"]["value"]) == ("principled", 1, [0.5, 1, 0.5])
+    assert (glass["type"], glass["transmission_weight"], glass["transmission_color"]["value"]) == ("openpbr", 1, [0.5, 1, 0.5])
+    below = surface(tmp_path, """color3f inputs:base_color = (1, 0, 0)
+        float inputs:subsurface = 0.25
+        color3f inputs:subsurface_color = (0, 1, 0)
+        color3f inputs:coat_color = (0.5, 1, 1)
+        float inputs:coat = 1""", **STANDARD)
+    assert below["base_color"]["value"] == pytest.approx([0.75, 0.25, 0]) and below["coat_color"]["value"] == [0.5, 1, 1]
     lamp = load(tmp_path, CAMERA + material("float inputs:emission = 3\ncolor3f inputs:emission_color = (1, 0.5, 0)", **STANDARD))
     assert lamp["/Quad.emitter.radiance"]["value"] == [3, 1.5, 0]
 
 
 def test_open_pbr(tmp_path: Path) -> None:
-    p = principled(tmp_path, "float inputs:base_metalness = 1\nfloat inputs:specular_weight = 0.5\nfloat inputs:coat_weight = 0.25",
+    p = surface(tmp_path, "float inputs:base_metalness = 1\nfloat inputs:specular_weight = 0.5\nfloat inputs:coat_weight = 0.25",
                    **OPEN_PBR)
-    assert [p[n] for n in ("metallic", "specular_weight", "clearcoat", "roughness")] == pytest.approx([1, 0.5, 0.25, 0.3])
+    names = ("base_metalness", "specular_weight", "coat_weight", "coat_ior", "specular_roughness")
+    assert [p[n] for n in names] == pytest.approx([1, 0.5, 0.25, 1.6, 0.3])
+    thin = load(tmp_path, CAMERA + SKY + material("float inputs:transmission_weight = 1\nbool inputs:geometry_thin_walled = 1", **OPEN_PBR))
+    assert thin["/Quad.bsdf.thin_walled"] is True
+    image(thin)
     cut = load(tmp_path, CAMERA + SKY + material("float inputs:geometry_opacity = 0.5", **OPEN_PBR))
     assert cut["/Quad.bsdf.opacity"] == 0.5
     image(cut)
@@ -304,7 +315,7 @@ def test_nodes_of_materialx(tmp_path: Path) -> None:
             color3f inputs:in1.connect = </Paint/Image.outputs:out>
             color3f inputs:in2 = (0.5, 1, 1)
             color3f outputs:out }"""
-    p = principled(tmp_path, "color3f inputs:base_color.connect = </Paint/Product.outputs:out>", nodes, **STANDARD)
+    p = surface(tmp_path, "color3f inputs:base_color.connect = </Paint/Product.outputs:out>", nodes, **STANDARD)
     assert p["base_color"]["type"] == "scale" and p["base_color"]["scale"]["value"] == [0.5, 1, 1]
     bitmap = p["base_color"]["value"]
     assert "raw" not in bitmap and np.diag(bitmap["to_uv"])[:2] == pytest.approx([2, 3])
@@ -357,13 +368,13 @@ def test_documents_of_materialx(tmp_path: Path) -> None:
     (tmp_path / "looks" / "looks.mtlx").write_text(DOCUMENT)
     paint = load(tmp_path, CAMERA + SKY + REFERRING % "Paint")
     p = paint["/Looks/Materials/Paint.bsdf"]
-    assert p["type"] == "principled" and p["roughness"] == pytest.approx(0.4)
+    assert p["type"] == "openpbr" and p["specular_roughness"] == pytest.approx(0.4)
     assert p["base_color"]["type"] == "scale" and p["base_color"]["scale"]["value"] == [0.5, 1, 1]
     bitmap = p["base_color"]["value"]
     assert "raw" not in bitmap and np.diag(bitmap["to_uv"])[:2] == pytest.approx([2, 3])
     assert image(paint).mean() > 0.01
     gold = load(tmp_path, CAMERA + SKY + REFERRING % "Gold")["/Looks/Materials/Gold.bsdf"]
-    assert gold["base_color"]["value"] == pytest.approx([0.4995, 0.2140, 0], abs=1e-3) and gold["metallic"] == 1
+    assert gold["base_color"]["value"] == pytest.approx([0.4995, 0.2140, 0], abs=1e-3) and gold["base_metalness"] == 1
 
 
 @pytest.mark.parametrize("change, message", [

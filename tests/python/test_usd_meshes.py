@@ -216,7 +216,7 @@ def test_subsets_have_their_own_materials(tmp_path: Path) -> None:
                 token outputs:surface } }"""
     d = load(tmp_path, CAMERA + SUN + text)
     assert len(d["/Cube/Top"]["mesh"]["triangles"]) == 4 and len(d["/Cube"]["mesh"]["triangles"]) == 8
-    assert d["/Cube/Top.bsdf.bsdf"]["type"] == "principled" and d["/Cube.bsdf.bsdf"]["type"] == "diffuse"
+    assert d["/Cube/Top.bsdf.bsdf"]["type"] == "openpbr" and d["/Cube.bsdf.bsdf"]["type"] == "diffuse"
     refined = load(tmp_path, CAMERA + SUN + text.replace('uniform token subdivisionScheme = "none"', ""), subdivision=1)
     assert len(refined["/Cube/Top"]["mesh"]["triangles"]) == 16
 

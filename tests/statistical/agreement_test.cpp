@@ -63,6 +63,12 @@ const std::string kBumped =
     "<float name=\"scale\" value=\"0.4\"/><bsdf type=\"diffuse\"/></bsdf></bsdf>";
 const std::string kRoughPlastic =
     "<bsdf type=\"roughplastic\"><float name=\"alpha\" value=\"0.2\"/></bsdf>";
+const std::string kOpenPbr =
+    "<bsdf type=\"openpbr\"><rgb name=\"base_color\" value=\"0.8,0.5,0.3\"/><float "
+    "name=\"specular_roughness\" value=\"0.5\"/><float name=\"base_metalness\" value=\"0.3\"/>"
+    "<float name=\"transmission_weight\" value=\"0.5\"/><float name=\"coat_weight\" "
+    "value=\"0.6\"/><float name=\"coat_roughness\" value=\"0.4\"/><float name=\"fuzz_weight\" "
+    "value=\"0.5\"/></bsdf>";
 const std::string kTinted =
     "<bsdf type=\"roughdielectric\"><float name=\"alpha\" value=\"0.3\"/></bsdf><medium "
     "type=\"homogeneous\" name=\"interior\">"
@@ -121,6 +127,7 @@ std::vector<AgreementCase> cases() {
         {"medium", front + room() + area_lamp() + sphere("0,-0.4,0", "0.5", kTinted), true},
         {"roughplastic", front + room() + area_lamp() + sphere("0,-0.4,0", "0.5", kRoughPlastic),
          true},
+        {"openpbr", front + room() + area_lamp() + sphere("0,-0.4,0", "0.5", kOpenPbr), true},
         {"smooth_mesh", front + room() + area_lamp() + smooth_mesh(diffuse("0.8,0.6,0.4")), true},
         {"smooth_glass", front + room() + area_lamp() + smooth_mesh(kRoughGlass), true},
         {"lantern", lantern_room(front), false, 768},

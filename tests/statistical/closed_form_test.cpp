@@ -96,6 +96,12 @@ struct FurnaceCase {
     bool light = true;  ///< Whether light paths see all of it.
 };
 
+/// Walks in the ball take many reflections: the depth of the furnace is enough for them.
+const std::string kWhiteHalfGlass =
+    "<bsdf type=\"openpbr\"><float name=\"base_color\" value=\"1\"/><float "
+    "name=\"base_metalness\" value=\"0.2\"/><float name=\"transmission_weight\" value=\"0.5\"/>"
+    "<float name=\"specular_roughness\" value=\"0.6\"/></bsdf>";
+
 class Furnace : public ::testing::TestWithParam<FurnaceCase> {
 protected:
     Furnace() : scene(build(GetParam().xml)) {}
@@ -131,6 +137,8 @@ INSTANTIATE_TEST_SUITE_P(
                     furnace("cube") +
                         rectangle("<translate z=\"0.3\"/>", "<bsdf type=\"thindielectric\"/>"),
                     false},
+        // Half of the light that enters the ball meets the opaque half from behind.
+        FurnaceCase{"half_glass", furnace("sphere") + sphere("-0.4,0,0.2", "0.3", kWhiteHalfGlass)},
         FurnaceCase{"part_of_mixture", furnace("sphere", "perspective", "", mixture({0.75f}))},
         FurnaceCase{"mixture_above_one",
                     furnace("sphere", "perspective", "", mixture({0.9f, 0.7f}))},

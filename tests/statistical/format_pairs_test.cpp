@@ -566,8 +566,8 @@ const std::string kCameraLikeGltf =
 const std::string kPointLikeGltf = R"(<emitter type="point"><point name="position" value="-1 3 3"/>
     <rgb name="intensity" value="40 36 32"/></emitter>)";
 const std::string kGreyOfGltf =
-    R"(<bsdf type="twosided"><bsdf type="principled"><rgb name="base_color" value=".5 .5 .5"/>
-    <float name="metallic" value="0"/><float name="roughness" value="1"/><float name="eta" value="1.5"/></bsdf></bsdf>)";
+    R"(<bsdf type="twosided"><bsdf type="openpbr"><rgb name="base_color" value=".5 .5 .5"/>
+    <float name="base_metalness" value="0"/><float name="specular_roughness" value="1"/><float name="specular_ior" value="1.5"/></bsdf></bsdf>)";
 
 /// `bsdf` has the id "m".
 SceneDescription like_gltf(const std::string& bsdf, const std::string& camera,
@@ -615,56 +615,56 @@ TEST_P(GltfMaterials, HaveTheImageOfTheirTranslation) {
 const GltfPair kGltfMaterialPairs[] = {
     {"MetalAndRoughness",
      R"({"pbrMetallicRoughness":{"baseColorFactor":[0.9,0.6,0.3,1],"metallicFactor":0.7,"roughnessFactor":0.4}})",
-     R"(type="twosided"><bsdf type="principled"><rgb name="base_color" value=".9 .6 .3"/>
-        <float name="metallic" value=".7"/><float name="roughness" value=".4"/><float name="eta" value="1.5"/></bsdf>)"},
+     R"(type="twosided"><bsdf type="openpbr"><rgb name="base_color" value=".9 .6 .3"/>
+        <float name="base_metalness" value=".7"/><float name="specular_roughness" value=".4"/><float name="specular_ior" value="1.5"/></bsdf>)"},
     {"DefaultsAreWhiteRoughMetal", R"({})",
-     R"(type="twosided"><bsdf type="principled"><rgb name="base_color" value="1 1 1"/>
-        <float name="metallic" value="1"/><float name="roughness" value="1"/><float name="eta" value="1.5"/></bsdf>)"},
+     R"(type="twosided"><bsdf type="openpbr"><rgb name="base_color" value="1 1 1"/>
+        <float name="base_metalness" value="1"/><float name="specular_roughness" value="1"/><float name="specular_ior" value="1.5"/></bsdf>)"},
     {"BaseColorTexture",
      R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0},"metallicFactor":0,"roughnessFactor":0.5}})",
-     R"(type="twosided"><bsdf type="principled"><texture type="bitmap" name="base_color">
+     R"(type="twosided"><bsdf type="openpbr"><texture type="bitmap" name="base_color">
         <string name="filename" value="../data/image.ppm"/><string name="filter_type" value="nearest"/></texture>
-        <float name="metallic" value="0"/><float name="roughness" value=".5"/><float name="eta" value="1.5"/></bsdf>)"},
+        <float name="base_metalness" value="0"/><float name="specular_roughness" value=".5"/><float name="specular_ior" value="1.5"/></bsdf>)"},
     // The matrix of the extension is translation · rotation · scale, with the rotation from u toward -v.
     {"TextureTransform",
      R"({"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":0.5,"baseColorTexture":{"index":0,
         "extensions":{"KHR_texture_transform":{"offset":[0.1,0.2],"rotation":0.5235987756,"scale":[2,3]}}}}})",
-     R"(type="twosided"><bsdf type="principled"><texture type="bitmap" name="base_color">
+     R"(type="twosided"><bsdf type="openpbr"><texture type="bitmap" name="base_color">
         <string name="filename" value="../data/image.ppm"/><string name="filter_type" value="nearest"/>
         <transform name="to_uv"><scale x="2" y="3"/><rotate z="1" angle="-30"/><translate x=".1" y=".2"/></transform>
-        </texture><float name="metallic" value="0"/><float name="roughness" value=".5"/>
-        <float name="eta" value="1.5"/></bsdf>)"},
+        </texture><float name="base_metalness" value="0"/><float name="specular_roughness" value=".5"/>
+        <float name="specular_ior" value="1.5"/></bsdf>)"},
     {"MetalAndRoughnessTexture",
      R"({"pbrMetallicRoughness":{"metallicRoughnessTexture":{"index":0}}})",
-     R"(type="twosided"><bsdf type="principled"><rgb name="base_color" value="1 1 1"/>
-        <texture type="bitmap" name="metallic"><string name="filename" value="../data/image.ppm"/>
+     R"(type="twosided"><bsdf type="openpbr"><rgb name="base_color" value="1 1 1"/>
+        <texture type="bitmap" name="base_metalness"><string name="filename" value="../data/image.ppm"/>
           <string name="filter_type" value="nearest"/><boolean name="raw" value="true"/>
           <string name="channel" value="b"/></texture>
-        <texture type="bitmap" name="roughness"><string name="filename" value="../data/image.ppm"/>
+        <texture type="bitmap" name="specular_roughness"><string name="filename" value="../data/image.ppm"/>
           <string name="filter_type" value="nearest"/><boolean name="raw" value="true"/>
-          <string name="channel" value="g"/></texture><float name="eta" value="1.5"/></bsdf>)"},
+          <string name="channel" value="g"/></texture><float name="specular_ior" value="1.5"/></bsdf>)"},
     {"NormalTexture",
      R"({"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":0.5},"normalTexture":{"index":0}})",
      R"(type="twosided"><bsdf type="normalmap"><texture type="bitmap" name="normalmap">
         <string name="filename" value="../data/image.ppm"/><string name="filter_type" value="nearest"/>
         <boolean name="raw" value="true"/></texture>
-        <bsdf type="principled"><rgb name="base_color" value="1 1 1"/><float name="metallic" value="0"/>
-        <float name="roughness" value=".5"/><float name="eta" value="1.5"/></bsdf></bsdf>)"},
+        <bsdf type="openpbr"><rgb name="base_color" value="1 1 1"/><float name="base_metalness" value="0"/>
+        <float name="specular_roughness" value=".5"/><float name="specular_ior" value="1.5"/></bsdf></bsdf>)"},
     {"Index",
      R"({"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":0.3},"extensions":{"KHR_materials_ior":{"ior":1.8}}})",
-     R"(type="twosided"><bsdf type="principled"><rgb name="base_color" value="1 1 1"/><float name="metallic" value="0"/>
-        <float name="roughness" value=".3"/><float name="eta" value="1.8"/></bsdf>)"},
+     R"(type="twosided"><bsdf type="openpbr"><rgb name="base_color" value="1 1 1"/><float name="base_metalness" value="0"/>
+        <float name="specular_roughness" value=".3"/><float name="specular_ior" value="1.8"/></bsdf>)"},
     // A quarter of the reflectance of 1.5, 0.04, is that of 11/9.
     {"SpecularFactor",
      R"({"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":0.3},
         "extensions":{"KHR_materials_specular":{"specularFactor":0.25}}})",
-     R"(type="twosided"><bsdf type="principled"><rgb name="base_color" value="1 1 1"/><float name="metallic" value="0"/>
-        <float name="roughness" value=".3"/><float name="eta" value="1.22222222"/></bsdf>)"},
+     R"(type="twosided"><bsdf type="openpbr"><rgb name="base_color" value="1 1 1"/><float name="base_metalness" value="0"/>
+        <float name="specular_roughness" value=".3"/><float name="specular_ior" value="1.22222222"/></bsdf>)"},
     {"BlendedAlpha",
      R"({"alphaMode":"BLEND","pbrMetallicRoughness":{"baseColorFactor":[0.9,0.6,0.3,0.4],"metallicFactor":0}})",
-     R"(type="mask"><float name="opacity" value=".4"/><bsdf type="twosided"><bsdf type="principled">
-        <rgb name="base_color" value=".9 .6 .3"/><float name="metallic" value="0"/><float name="roughness" value="1"/>
-        <float name="eta" value="1.5"/></bsdf></bsdf>)"},
+     R"(type="mask"><float name="opacity" value=".4"/><bsdf type="twosided"><bsdf type="openpbr">
+        <rgb name="base_color" value=".9 .6 .3"/><float name="base_metalness" value="0"/><float name="specular_roughness" value="1"/>
+        <float name="specular_ior" value="1.5"/></bsdf></bsdf>)"},
     {"AlphaBelowTheCutoff",
      R"({"alphaMode":"MASK","alphaCutoff":0.5,"pbrMetallicRoughness":{"baseColorFactor":[1,1,1,0.4]}})",
      R"(type="null">)"},
@@ -678,16 +678,16 @@ const GltfPair kGltfMaterialPairs[] = {
      R"({"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":0.2},"extensions":{
         "KHR_materials_transmission":{"transmissionFactor":1},
         "KHR_materials_volume":{"thicknessFactor":1,"attenuationDistance":0.5,"attenuationColor":[0.5,0.8,0.9]}}})",
-     R"(type="principled"><rgb name="base_color" value="1 1 1"/><float name="metallic" value="0"/>
-        <float name="roughness" value=".2"/><float name="eta" value="1.5"/><float name="spec_trans" value="1"/>)",
+     R"(type="openpbr"><rgb name="base_color" value="1 1 1"/><float name="base_metalness" value="0"/>
+        <float name="specular_roughness" value=".2"/><float name="specular_ior" value="1.5"/><float name="transmission_weight" value="1"/>)",
      "",
      R"(<medium type="homogeneous" name="interior"><rgb name="sigma_t" value="1.3862944 0.44628710 0.21072103"/>
         <float name="albedo" value="0"/></medium>)"},
     {"Emission",
      R"({"pbrMetallicRoughness":{"metallicFactor":0},"emissiveFactor":[1,0.5,0.25],
         "extensions":{"KHR_materials_emissive_strength":{"emissiveStrength":4}}})",
-     R"(type="twosided"><bsdf type="principled"><rgb name="base_color" value="1 1 1"/><float name="metallic" value="0"/>
-        <float name="roughness" value="1"/><float name="eta" value="1.5"/></bsdf>)",
+     R"(type="twosided"><bsdf type="openpbr"><rgb name="base_color" value="1 1 1"/><float name="base_metalness" value="0"/>
+        <float name="specular_roughness" value="1"/><float name="specular_ior" value="1.5"/></bsdf>)",
      R"(<emitter type="area"><rgb name="radiance" value="4 2 1"/></emitter>)"},
 };
 INSTANTIATE_TEST_SUITE_P(FormatPairs, GltfMaterials, ::testing::ValuesIn(kGltfMaterialPairs),
@@ -697,9 +697,9 @@ INSTANTIATE_TEST_SUITE_P(FormatPairs, GltfMaterials, ::testing::ValuesIn(kGltfMa
 class GltfLights : public ::testing::TestWithParam<GltfPair> {};
 TEST_P(GltfLights, HaveTheImageOfTheirTranslation) {
     expect_same_images(gltf(kGltfGrey, kGltfCamera, GetParam().gltf),
-                       like_gltf(R"(<bsdf id="m" type="twosided"><bsdf type="principled">
-        <rgb name="base_color" value="1 1 1"/><float name="metallic" value="0"/><float name="roughness" value="1"/>
-        <float name="eta" value="1.5"/></bsdf></bsdf>)",
+                       like_gltf(R"(<bsdf id="m" type="twosided"><bsdf type="openpbr">
+        <rgb name="base_color" value="1 1 1"/><float name="base_metalness" value="0"/><float name="specular_roughness" value="1"/>
+        <float name="specular_ior" value="1.5"/></bsdf></bsdf>)",
                                  kCameraLikeGltf, GetParam().mitsuba),
                        "path", kSmall);
 }
@@ -723,9 +723,10 @@ INSTANTIATE_TEST_SUITE_P(FormatPairs, GltfLights, ::testing::ValuesIn(kGltfLight
 
 TEST(GltfCameras, HaveTheImageOfTheirTranslation) {
     const std::string bsdf =
-        "<bsdf id=\"m\" type=\"twosided\"><bsdf type=\"principled\"><rgb name=\"base_color\" "
-        "value=\"1 1 1\"/><float name=\"metallic\" value=\"0\"/><float name=\"roughness\" "
-        "value=\"1\"/><float name=\"eta\" value=\"1.5\"/></bsdf></bsdf>";
+        "<bsdf id=\"m\" type=\"twosided\"><bsdf type=\"openpbr\"><rgb name=\"base_color\" "
+        "value=\"1 1 1\"/><float name=\"base_metalness\" value=\"0\"/><float "
+        "name=\"specular_roughness\" "
+        "value=\"1\"/><float name=\"specular_ior\" value=\"1.5\"/></bsdf></bsdf>";
     const std::string orthographic =
         R"(<sensor type="orthographic"><transform name="to_world"><scale x="3" y="3"/>
         <lookat origin="0 0 6" target="0 0 0" up="0 1 0"/></transform>)" +

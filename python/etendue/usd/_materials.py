@@ -1,4 +1,4 @@
-"""Materials: UsdPreviewSurface, and MaterialX's standard_surface and OpenPBR, as `principled`."""
+"""Materials: UsdPreviewSurface, and MaterialX's standard_surface and OpenPBR, as `openpbr`."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -102,14 +102,14 @@ def _surface(context: Context, shader: Any, model: Model) -> Material:
     parameters = model.parameters(inputs)
     emission = parameters.pop("emission")
     opacity, pane = parameters.pop("opacity"), parameters.pop("pane")
-    transmits = parameters.get("spec_trans", 0) != 0
-    bsdf: Object = {"type": "principled", **parameters}
+    transmits = parameters.get("transmission_weight", 0) != 0
+    bsdf: Object = {"type": "openpbr", **parameters}
     if bump is not None:
         bsdf = {"type": "normalmap", **bump, "bsdf": bsdf}
     if not transmits:
         bsdf = {"type": "twosided", "bsdf": bsdf}
     if pane:
-        clear = {"type": "thindielectric", "int_ior": parameters["eta"], "ext_ior": 1.0}
+        clear = {"type": "thindielectric", "int_ior": parameters["specular_ior"], "ext_ior": 1.0}
         bsdf = {"type": "blendbsdf", "weight": opacity, "bsdf": clear, "bsdf_2": bsdf}
     elif opacity != 1:
         bsdf = {"type": "mask", "opacity": opacity, "bsdf": bsdf}

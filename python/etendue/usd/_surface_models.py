@@ -1,10 +1,10 @@
-"""Which parameters of `principled` stand for the inputs of each surface shader."""
+"""Which parameters of `openpbr` stand for the inputs of each surface shader."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from ._context import Object
+from ._context import rgb
 from ._networks import Inputs, luminance, product
 
 Parameters = dict[str, Any]
@@ -16,18 +16,12 @@ class Model:
 
     defaults: dict[str, Any]
     normal: str  # Its input for normals.
-    parameters: Callable[[Inputs], Parameters]  # Those of principled; and emission, opacity, and pane, whether it is clear.
+    parameters: Callable[[Inputs], Parameters]  # Those of openpbr; and emission, opacity, and pane, whether it is clear.
     ignored: tuple[str, ...]  # Inputs without an effect.
 
     def without_effect(self, inputs: Inputs) -> list[str]:
         """Inputs that a file sets to another value than their default, and that have no effect."""
         return [name for name in self.ignored if inputs.is_changed(name)]
-
-
-def _gloss(inputs: Inputs, name: str) -> float:
-    """The clearcoat_gloss of a roughness: from 0 to 1 it is an α from 0.1 to 0.001."""
-    alpha = inputs.number(name)**2
-    return float(min(max((0.1 - alpha) / 0.099, 0.0), 1.0))
 
 
 def _emission(color: Any, strength: float) -> Any:
@@ -41,75 +35,93 @@ def _ior(value: float) -> float:
 
 
 def _preview_surface(inputs: Inputs) -> Parameters:
-    made: Parameters = {"roughness": inputs.scalar("roughness"), "eta": _ior(inputs.number("ior"))}
+    made: Parameters = {"specular_roughness": inputs.scalar("roughness"), "specular_ior": _ior(inputs.number("ior"))}
     diffuse = inputs.color("diffuseColor")
     if int(inputs.number("useSpecularWorkflow")) == 1:
         specular = inputs.color("specularColor")
-        for output in ("base_color", "metallic", "specular_weight"):
-            made[output] = {"type": "specular_to_metallic", "output": output, "diffuse": diffuse, "specular": specular}
-        del made["eta"]
+        for name, output in (("base_color", "base_color"), ("base_metalness", "metallic"), ("specular_weight", "specular_weight")):
+            made[name] = {"type": "specular_to_metallic", "output": output, "diffuse": diffuse, "specular": specular}
+        del made["specular_ior"]
     else:
-        made.update(base_color=diffuse, metallic=inputs.scalar("metallic"))
+        made.update(base_color=diffuse, base_metalness=inputs.scalar("metallic"))
     if inputs.is_changed("clearcoat"):
-        made.update(clearcoat=inputs.scalar("clearcoat"), clearcoat_gloss=_gloss(inputs, "clearcoatRoughness"))
+        made.update(coat_weight=inputs.scalar("clearcoat"), coat_roughness=_share(inputs, "clearcoatRoughness"), coat_ior=1.5)
     opacity, threshold = inputs.scalar("opacity"), inputs.number("opacityThreshold")
     is_constant = not isinstance(opacity, dict)
     if threshold > 0:
         opacity = float(opacity >= threshold) if is_constant else {"type": "threshold", "value": opacity, "cutoff": threshold}
-    pane = threshold <= 0 and is_constant and opacity < 1 and inputs.token("opacityMode") == "transparent" and "eta" in made
+    pane = threshold <= 0 and is_constant and opacity < 1 and inputs.token("opacityMode") == "transparent" and \
+        "specular_ior" in made
     return {**made, "emission": _emission(inputs.color("emissiveColor"), 1), "opacity": opacity, "pane": pane}
 
 
-def _glass(made: Parameters, transmission: float, color: Any) -> None:
-    """Light that is transmitted has the colour of the base in principled."""
-    if transmission > 0:
-        made["spec_trans"] = min(transmission, 1.0)
-        made["base_color"] = color if transmission == 1 or isinstance(made["base_color"], dict) and \
-            made["base_color"]["type"] != "rgb" else _mixed(made["base_color"], color, transmission)
+def _share(inputs: Inputs, name: str) -> float:
+    return min(max(inputs.number(name), 0.0), 1.0)
 
 
-def _mixed(a: Object, b: Any, weight: float) -> Any:
-    if b.get("type") != "rgb":
-        return b
-    return {"type": "rgb", "value": [x + (y - x) * weight for x, y in zip(a["value"], b["value"])]}
+def _base(inputs: Inputs, factor: str, subsurface: str) -> Any:
+    """The base colour, blended with that of subsurface scattering, which is taken for diffuse."""
+    base, weight = product(inputs.color("base_color"), inputs.number(factor)), _share(inputs, subsurface)
+    if weight == 0:
+        return base
+    below = inputs.color("subsurface_color")
+    if base.get("type") == "rgb" == below.get("type"):
+        return rgb([x + (y - x) * weight for x, y in zip(base["value"], below["value"])])
+    return {"type": "mix", "value0": base, "value1": below, "weight": weight}
+
+
+def _layers(inputs: Inputs, coat: str, ior: str, fuzz: str) -> Parameters:
+    """Those of a coat and of cloth, where there are any."""
+    made: Parameters = {}
+    if inputs.is_changed(coat):
+        prefix = coat.removesuffix("_weight")
+        made.update(coat_weight=inputs.scalar(coat), coat_color=inputs.constant_color(f"{prefix}_color"),
+                    coat_roughness=_share(inputs, f"{prefix}_roughness"), coat_ior=_ior(inputs.number(ior)))
+    if inputs.is_changed(fuzz):
+        prefix = fuzz.removesuffix("_weight")
+        made.update(fuzz_weight=inputs.scalar(fuzz), fuzz_color=inputs.constant_color(f"{prefix}_color"),
+                    fuzz_roughness=_share(inputs, f"{prefix}_roughness"))
+    return made
 
 
 def _standard_surface(inputs: Inputs) -> Parameters:
-    made: Parameters = {
-        "base_color": product(inputs.color("base_color"), inputs.number("base")),
-        "metallic": inputs.scalar("metalness"),
-        "roughness": inputs.scalar("specular_roughness"),
-        "anisotropic": inputs.scalar("specular_anisotropy"),
-        "eta": _ior(inputs.number("specular_IOR")),
+    return {
+        "base_color": _base(inputs, "base", "subsurface"),
+        "base_diffuse_roughness": _share(inputs, "diffuse_roughness"),
+        "base_metalness": inputs.scalar("metalness"),
         "specular_weight": inputs.scalar("specular"),
         "specular_color": inputs.color("specular_color"),
-        "clearcoat": inputs.scalar("coat"),
-        "clearcoat_gloss": _gloss(inputs, "coat_roughness"),
-        "sheen": inputs.scalar("sheen"),
-        "flatness": inputs.scalar("subsurface"),
+        "specular_roughness": inputs.scalar("specular_roughness"),
+        "specular_roughness_anisotropy": _share(inputs, "specular_anisotropy"),
+        "specular_ior": _ior(inputs.number("specular_IOR")),
+        "transmission_weight": inputs.scalar("transmission"),
+        "transmission_color": inputs.color("transmission_color"),
+        "thin_walled": bool(inputs.number("thin_walled")),
+        **_layers(inputs, "coat", "coat_IOR", "sheen"),
+        "emission": _emission(inputs.color("emission_color"), inputs.number("emission")),
+        "opacity": luminance(inputs.color("opacity")),
+        "pane": False,
     }
-    _glass(made, inputs.number("transmission"), inputs.color("transmission_color"))
-    made["emission"] = _emission(inputs.color("emission_color"), inputs.number("emission"))
-    return {**made, "opacity": luminance(inputs.color("opacity")), "pane": False}
 
 
 def _open_pbr(inputs: Inputs) -> Parameters:
-    made: Parameters = {
-        "base_color": product(inputs.color("base_color"), inputs.number("base_weight")),
-        "metallic": inputs.scalar("base_metalness"),
-        "roughness": inputs.scalar("specular_roughness"),
-        "anisotropic": inputs.scalar("specular_roughness_anisotropy"),
-        "eta": _ior(inputs.number("specular_ior")),
+    return {
+        "base_color": _base(inputs, "base_weight", "subsurface_weight"),
+        "base_diffuse_roughness": _share(inputs, "base_diffuse_roughness"),
+        "base_metalness": inputs.scalar("base_metalness"),
         "specular_weight": inputs.scalar("specular_weight"),
         "specular_color": inputs.color("specular_color"),
-        "clearcoat": inputs.scalar("coat_weight"),
-        "clearcoat_gloss": _gloss(inputs, "coat_roughness"),
-        "sheen": inputs.scalar("fuzz_weight"),
-        "flatness": inputs.scalar("subsurface_weight"),
+        "specular_roughness": inputs.scalar("specular_roughness"),
+        "specular_roughness_anisotropy": _share(inputs, "specular_roughness_anisotropy"),
+        "specular_ior": _ior(inputs.number("specular_ior")),
+        "transmission_weight": inputs.scalar("transmission_weight"),
+        "transmission_color": inputs.color("transmission_color"),
+        "thin_walled": bool(inputs.number("geometry_thin_walled")),
+        **_layers(inputs, "coat_weight", "coat_ior", "fuzz_weight"),
+        "emission": _emission(inputs.color("emission_color"), inputs.number("emission_luminance")),
+        "opacity": inputs.scalar("geometry_opacity"),
+        "pane": False,
     }
-    _glass(made, inputs.number("transmission_weight"), inputs.color("transmission_color"))
-    made["emission"] = _emission(inputs.color("emission_color"), inputs.number("emission_luminance"))
-    return {**made, "opacity": inputs.scalar("geometry_opacity"), "pane": False}
 
 
 WHITE = (1.0, 1.0, 1.0)
@@ -128,9 +140,8 @@ MODELS = {
          "sheen_roughness": 0.3, "coat": 0, "coat_color": WHITE, "coat_roughness": 0.1, "coat_IOR": 1.5, "coat_anisotropy": 0,
          "thin_film_thickness": 0, "emission": 0, "emission_color": WHITE, "opacity": WHITE, "thin_walled": False},
         "normal", _standard_surface,
-        ("diffuse_roughness", "specular_rotation", "transmission_depth", "transmission_scatter", "transmission_dispersion",
-         "transmission_extra_roughness", "subsurface_color", "sheen_color", "sheen_roughness", "coat_color", "coat_IOR",
-         "coat_anisotropy", "thin_film_thickness", "thin_walled", "coat_normal", "tangent")),
+        ("specular_rotation", "transmission_depth", "transmission_scatter", "transmission_dispersion",
+         "transmission_extra_roughness", "coat_anisotropy", "thin_film_thickness", "coat_normal", "tangent")),
     "ND_open_pbr_surface_surfaceshader": Model(
         {"base_weight": 1, "base_color": (0.8, 0.8, 0.8), "base_diffuse_roughness": 0, "base_metalness": 0, "specular_weight": 1,
          "specular_color": WHITE, "specular_roughness": 0.3, "specular_ior": 1.5, "specular_roughness_anisotropy": 0,
@@ -140,9 +151,8 @@ MODELS = {
          "coat_roughness_anisotropy": 0, "coat_darkening": 1, "thin_film_weight": 0, "emission_luminance": 0,
          "emission_color": WHITE, "geometry_opacity": 1, "geometry_thin_walled": False},
         "geometry_normal", _open_pbr,
-        ("base_diffuse_roughness", "transmission_depth", "transmission_scatter", "transmission_dispersion_scale",
-         "subsurface_color", "fuzz_color", "fuzz_roughness", "coat_color", "coat_ior", "coat_roughness_anisotropy",
-         "coat_darkening", "thin_film_weight", "geometry_thin_walled", "geometry_coat_normal", "geometry_tangent")),
+        ("transmission_depth", "transmission_scatter", "transmission_dispersion_scale", "coat_roughness_anisotropy",
+         "coat_darkening", "thin_film_weight", "geometry_coat_normal", "geometry_tangent")),
 }
 # As a node of MaterialX.
 MODELS["ND_UsdPreviewSurface_surfaceshader"] = MODELS["UsdPreviewSurface"]

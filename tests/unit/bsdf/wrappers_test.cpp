@@ -404,7 +404,7 @@ TEST(MaterialRegistry, NamesAreUniqueAndEveryParameterIsDocumented) {
         for (const ParamInfo& p : entry.info.params)
             EXPECT_TRUE(std::string(p.doc).ends_with('.')) << entry.info.name << " " << p.name;
     }
-    EXPECT_EQ(names.size(), 22u);
+    EXPECT_EQ(names.size(), 23u);
 }
 
 }  // namespace

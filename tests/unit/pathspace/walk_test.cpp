@@ -194,6 +194,7 @@ std::vector<std::string> broad_materials() {
                                                           {"roughplastic", "alpha"},
                                                           {"phong", ""},
                                                           {"principled", ""},
+                                                          {"openpbr", "specular_roughness"},
                                                           {"coatedconductor", "alpha"},
                                                           {"fresnelblend", "alpha"}})
         all.push_back(

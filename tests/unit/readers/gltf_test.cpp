@@ -85,6 +85,10 @@ T value_of(const SceneObject& o, const char* name) {
     return *v;
 }
 
+void expect_no_warning_of_materials(const SceneDescription& scene) {
+    for (const std::string& w : scene.warnings) EXPECT_EQ(w.find("/materials"), w.npos) << w;
+}
+
 TEST(Gltf, ReadsASquare) {
     const SceneDescription scene = with_material(
         R"({"pbrMetallicRoughness":{"baseColorFactor":[0.1,0.2,0.3,1],"metallicFactor":0.25,
@@ -92,11 +96,11 @@ TEST(Gltf, ReadsASquare) {
     ASSERT_EQ(scene.meshes.size(), 1u);
     EXPECT_EQ(scene.meshes[0]->positions[2], (Vec3{1, 1, 0}));
     EXPECT_EQ(scene.meshes[0]->triangles[1], (MeshData::Triangle{0, 2, 3}));
-    const SceneObject& m = find_type(scene, "principled");
+    const SceneObject& m = find_type(scene, "openpbr");
     EXPECT_EQ(value_of<Rgb>(m, "base_color"), Rgb(0.1f, 0.2f, 0.3f));
-    EXPECT_EQ(value_of<double>(m, "metallic"), 0.25);
-    EXPECT_EQ(value_of<double>(m, "roughness"), 0.5);
-    EXPECT_NEAR(value_of<double>(m, "eta"), 1.25, 1e-9);
+    EXPECT_EQ(value_of<double>(m, "base_metalness"), 0.25);
+    EXPECT_EQ(value_of<double>(m, "specular_roughness"), 0.5);
+    EXPECT_NEAR(value_of<double>(m, "specular_ior"), 1.25, 1e-9);
     // Without camera and light.
     EXPECT_EQ(find_type(scene, "constant").category, "emitter");
     EXPECT_EQ(find_type(scene, "perspective").category, "sensor");
@@ -195,14 +199,24 @@ TEST(Gltf, ExtensionsOfMaterialsSetTheirParameters) {
             "KHR_materials_transmission":{"transmissionFactor":0.75},
             "KHR_materials_volume":{"thicknessFactor":1,"attenuationDistance":2,"attenuationColor":[0.5,1,1]},
             "KHR_materials_clearcoat":{"clearcoatFactor":0.3,"clearcoatRoughnessFactor":0.1},
-            "KHR_materials_sheen":{"sheenColorFactor":[0.2,0.4,0.2]},
-            "KHR_materials_anisotropy":{"anisotropyStrength":0.6}}})");
-    const SceneObject& m = find_type(scene, "principled");
-    EXPECT_EQ(value_of<double>(m, "spec_trans"), 0.75);
-    EXPECT_EQ(value_of<double>(m, "clearcoat"), 0.3);
-    EXPECT_NEAR(value_of<double>(m, "clearcoat_gloss"), 0.09 / 0.099, 1e-9);
-    EXPECT_NEAR(value_of<double>(m, "sheen"), 0.4, 1e-6);
-    EXPECT_EQ(value_of<double>(m, "anisotropic"), 0.6);
+            "KHR_materials_sheen":{"sheenColorFactor":[0.2,0.4,0.2],"sheenRoughnessFactor":0.3},
+            "KHR_materials_anisotropy":{"anisotropyStrength":0.6}},
+            "pbrMetallicRoughness":{"roughnessFactor":0.5}})");
+    const SceneObject& m = find_type(scene, "openpbr");
+    EXPECT_EQ(value_of<double>(m, "transmission_weight"), 0.75);
+    EXPECT_EQ(value_of<Rgb>(m, "transmission_color"), Rgb(1));
+    EXPECT_FALSE(m.find("thin_walled"));
+    EXPECT_EQ(value_of<double>(m, "coat_weight"), 0.3);
+    EXPECT_EQ(value_of<double>(m, "coat_roughness"), 0.1);
+    EXPECT_EQ(value_of<double>(m, "coat_ior"), 1.5);
+    EXPECT_NEAR(value_of<double>(m, "fuzz_weight"), 0.4, 1e-6);
+    EXPECT_EQ(value_of<Rgb>(m, "fuzz_color"), Rgb(0.5f, 1, 0.5f));
+    EXPECT_EQ(value_of<double>(m, "fuzz_roughness"), 0.3);
+    // α is 0.25 across and 0.25 + 0.75 · 0.36 along the tangent.
+    const double ratio = 0.25 / 0.52;
+    EXPECT_NEAR(value_of<double>(m, "specular_roughness_anisotropy"), 1 - ratio, 1e-6);
+    EXPECT_NEAR(std::pow(value_of<double>(m, "specular_roughness"), 4),
+                (0.25 * 0.25 + 0.52 * 0.52) / 2, 1e-6);
     EXPECT_EQ(value_of<Rgb>(find_type(scene, "area"), "radiance"), Rgb(4, 2, 0));
     EXPECT_NEAR(value_of<Rgb>(find_type(scene, "homogeneous"), "sigma_t").r, std::log(2.0) / 2,
                 1e-6);
@@ -211,8 +225,9 @@ TEST(Gltf, ExtensionsOfMaterialsSetTheirParameters) {
 TEST(Gltf, TransmissionWithoutVolumeIsAPane) {
     const SceneDescription scene =
         with_material(R"({"extensions":{"KHR_materials_transmission":{"transmissionFactor":1}}})");
-    EXPECT_EQ(find_type(scene, "thindielectric").category, "bsdf");
-    EXPECT_EQ(value_of<double>(find_type(scene, "blendbsdf"), "weight"), 1);
+    const SceneObject& m = find_type(scene, "openpbr");
+    EXPECT_TRUE(value_of<bool>(m, "thin_walled"));
+    EXPECT_EQ(value_of<double>(m, "transmission_weight"), 1);
 }
 
 TEST(Gltf, TexturesKeepTheirTransformAndSampler) {
@@ -237,11 +252,9 @@ TEST(Gltf, SpecularReflectionHasAColourAndAWeight) {
         R"({"extensions":{"KHR_materials_ior":{"ior":1000},"KHR_materials_specular":{"specularFactor":0.5,
             "specularTexture":{"index":0},"specularColorFactor":[2,1,0],"specularColorTexture":{"index":1}}}})",
         R"(,"textures":[{"source":0},{"source":1}],"images":[{"uri":"a.png"},{"uri":"b.png"}])");
-    EXPECT_TRUE(std::any_of(scene.warnings.begin(), scene.warnings.end(), [](const auto& w) {
-        return w.find("of the specular colour the luminance is used") != w.npos;
-    }));
-    const SceneObject& m = find_type(scene, "principled");
-    EXPECT_EQ(value_of<double>(m, "eta"), 1000);
+    expect_no_warning_of_materials(scene);
+    const SceneObject& m = find_type(scene, "openpbr");
+    EXPECT_EQ(value_of<double>(m, "specular_ior"), 1000);
     ASSERT_EQ(m.children.size(), 2u);
     for (const auto& [name, expected] :
          {std::pair("specular_weight", ParamValue(0.5)), {"specular_color", Rgb(2, 1, 0)}}) {
@@ -260,7 +273,7 @@ TEST(Gltf, SpecularReflectionHasAColourAndAWeight) {
     // Without textures the factors alone.
     const SceneDescription black = with_material(
         R"({"extensions":{"KHR_materials_specular":{"specularColorFactor":[0,0,0]}}})");
-    EXPECT_EQ(value_of<Rgb>(find_type(black, "principled"), "specular_color"), Rgb(0));
+    EXPECT_EQ(value_of<Rgb>(find_type(black, "openpbr"), "specular_color"), Rgb(0));
 }
 
 TEST(Gltf, SpecularGlossinessIsReadAsWell) {
@@ -272,26 +285,27 @@ TEST(Gltf, SpecularGlossinessIsReadAsWell) {
     // A dielectric as others are, half of it there.
     const SceneDescription plastic =
         read(R"("diffuseFactor":[0.5,0.25,1,0.75],"specularFactor":[0.04,0.04,0.04])");
-    const SceneObject& p = find_type(plastic, "principled");
+    const SceneObject& p = find_type(plastic, "openpbr");
     const Rgb base = value_of<Rgb>(p, "base_color");
     EXPECT_NEAR(base.r, 0.5f, 1e-5f);
     EXPECT_NEAR(base.g, 0.25f, 1e-5f);
     EXPECT_NEAR(base.b, 1, 1e-5f);
-    EXPECT_NEAR(value_of<double>(p, "metallic"), 0, 1e-5);
-    EXPECT_NEAR(value_of<double>(p, "roughness"), 0.3, 1e-9);
+    EXPECT_NEAR(value_of<double>(p, "base_metalness"), 0, 1e-5);
+    EXPECT_NEAR(value_of<double>(p, "specular_roughness"), 0.3, 1e-9);
     EXPECT_EQ(value_of<double>(find_type(plastic, "mask"), "opacity"), 0.75);
     // Gold.
     const SceneDescription gold =
         read(R"("diffuseFactor":[0,0,0,1],"specularFactor":[1,0.75,0.3])");
-    const SceneObject& g = find_type(gold, "principled");
-    EXPECT_NEAR(value_of<double>(g, "metallic"), 1, 1e-5);
+    const SceneObject& g = find_type(gold, "openpbr");
+    EXPECT_NEAR(value_of<double>(g, "base_metalness"), 1, 1e-5);
     EXPECT_NEAR(value_of<Rgb>(g, "base_color").g, 0.75f, 1e-4f);
     EXPECT_NEAR(value_of<Rgb>(g, "base_color").b, 0.3f, 1e-4f);
     // Between them: the colours are those of the mixture.
     const SceneDescription half =
         read(R"("diffuseFactor":[0.4,0.4,0.4,1],"specularFactor":[0.3,0.3,0.3])");
-    const SceneObject& h = find_type(half, "principled");
-    const double m = value_of<double>(h, "metallic"), b = double(value_of<Rgb>(h, "base_color").r);
+    const SceneObject& h = find_type(half, "openpbr");
+    const double m = value_of<double>(h, "base_metalness"),
+                 b = double(value_of<Rgb>(h, "base_color").r);
     EXPECT_GT(m, 0.1);
     EXPECT_LT(m, 0.9);
     EXPECT_NEAR(0.96 * b * (1 - m), 0.4 * 0.7, 0.02);
@@ -315,10 +329,6 @@ const SceneObject& scaled_texture(const SceneDescription& scene, const SceneObje
     return texture_of(scene, product, "value");
 }
 
-void expect_no_warning_of_materials(const SceneDescription& scene) {
-    for (const std::string& w : scene.warnings) EXPECT_EQ(w.find("/materials"), w.npos) << w;
-}
-
 TEST(Gltf, SpecularGlossinessHasTextures) {
     const char* const kImages =
         R"(,"textures":[{"source":0},{"source":1}],"images":[{"uri":"a.png"},{"uri":"b.png"}])";
@@ -330,52 +340,47 @@ TEST(Gltf, SpecularGlossinessHasTextures) {
         read(R"("diffuseFactor":[0.5,1,1,1],"specularFactor":[1,0.5,0.5],"glossinessFactor":0.8,
                 "diffuseTexture":{"index":0},"specularGlossinessTexture":{"index":1})");
     expect_no_warning_of_materials(both);
-    const SceneObject& p = find_type(both, "principled");
-    for (const char* name : {"base_color", "metallic", "specular_weight"}) {
+    const SceneObject& p = find_type(both, "openpbr");
+    for (const auto& [name, output] : {std::pair("base_color", "base_color"),
+                                       {"base_metalness", "metallic"},
+                                       {"specular_weight", "specular_weight"}}) {
         const SceneObject& made = texture_of(both, p, name);
         EXPECT_EQ(made.type, "specular_to_metallic");
-        EXPECT_EQ(value_of<std::string>(made, "output"), name);
+        EXPECT_EQ(value_of<std::string>(made, "output"), output);
         const SceneObject &diffuse = scaled_texture(both, made, "diffuse", {0.5f, 1, 1}),
                           &specular = scaled_texture(both, made, "specular", {1, 0.5f, 0.5f});
         EXPECT_EQ(value_of<std::string>(diffuse, "filename"), "a.png");
         EXPECT_EQ(value_of<std::string>(specular, "filename"), "b.png");
         EXPECT_FALSE(specular.find("raw") || specular.find("channel"));  // colours of sRGB
     }
-    const SceneObject& rough = texture_of(both, p, "roughness");
+    const SceneObject& rough = texture_of(both, p, "specular_roughness");
     EXPECT_NEAR(value_of<double>(rough, "value1"), 0.2, 1e-9);
     EXPECT_EQ(value_of<std::string>(texture_of(both, rough, "weight"), "channel"), "opacity");
 
     // The share of metal depends on the diffuse colour where the specular one is brighter than a dielectric's.
     const SceneDescription metal =
         read(R"("specularFactor":[0.5,0.5,0.5],"diffuseTexture":{"index":0})");
-    EXPECT_EQ(texture_of(metal, find_type(metal, "principled"), "metallic").type,
+    EXPECT_EQ(texture_of(metal, find_type(metal, "openpbr"), "base_metalness").type,
               "specular_to_metallic");
     // Without specular reflection there is none of the dielectric, either.
     const SceneDescription matt = read(
         R"("specularFactor":[0,0,0],"diffuseTexture":{"index":0},"specularGlossinessTexture":{"index":1})");
-    const SceneObject& m = find_type(matt, "principled");
-    EXPECT_EQ(value_of<double>(m, "metallic"), 0);
+    const SceneObject& m = find_type(matt, "openpbr");
+    EXPECT_EQ(value_of<double>(m, "base_metalness"), 0);
     EXPECT_EQ(value_of<double>(m, "specular_weight"), 0);
     EXPECT_EQ(value_of<std::string>(texture_of(matt, m, "base_color"), "filename"), "a.png");
 }
 
-TEST(Gltf, SpecularColoursOfDielectricsAreThoseOfMetal) {
-    const auto read = [](const char* values) {
-        return with_material(
-            std::string(R"({"pbrMetallicRoughness":{"baseColorFactor":[0,0,0,1],"metallicFactor":0},
-            "extensions":{"KHR_materials_ior":{"ior":0},"KHR_materials_specular":{)") +
-                values + "}}}",
-            R"(,"textures":[{"source":0}],"images":[{"uri":"a.png"}])");
-    };
-    const SceneDescription gold = read(R"("specularColorFactor":[1,0.75,0.3])");
+TEST(Gltf, SpecularColoursOfDielectricsAreKept) {
+    const SceneDescription gold = with_material(
+        R"({"pbrMetallicRoughness":{"baseColorFactor":[0,0,0,1],"metallicFactor":0},
+            "extensions":{"KHR_materials_ior":{"ior":0},
+            "KHR_materials_specular":{"specularColorFactor":[1,0.75,0.3]}}})");
     expect_no_warning_of_materials(gold);
-    const SceneObject& g = find_type(gold, "principled");
-    EXPECT_NEAR(value_of<double>(g, "metallic"), 1, 1e-2);
-    EXPECT_NEAR(value_of<Rgb>(g, "base_color").g, 0.75f, 1e-2f);
-    EXPECT_NEAR(value_of<Rgb>(g, "base_color").b, 0.3f, 1e-2f);
-    const SceneDescription textured = read(R"("specularColorTexture":{"index":0})");
-    EXPECT_EQ(texture_of(textured, find_type(textured, "principled"), "metallic").type,
-              "specular_to_metallic");
+    const SceneObject& g = find_type(gold, "openpbr");
+    EXPECT_EQ(value_of<double>(g, "base_metalness"), 0);
+    EXPECT_EQ(value_of<double>(g, "specular_ior"), 1000);  // total reflection
+    EXPECT_EQ(value_of<Rgb>(g, "specular_color"), Rgb(1, 0.75f, 0.3f));
 }
 
 // What older exporters write, though the format does not allow it.

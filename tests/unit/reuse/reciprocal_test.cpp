@@ -44,6 +44,14 @@ std::vector<Case> cases() {
         {"principled",
          two_sided("<bsdf type=\"principled\"><float name=\"roughness\" value=\"0.5\"/></bsdf>"),
          kLamp},
+        {"openpbr",
+         two_sided("<bsdf type=\"openpbr\"><float name=\"coat_weight\" value=\"0.5\"/><float "
+                   "name=\"fuzz_weight\" value=\"0.5\"/></bsdf>"),
+         kLamp},
+        {"openpbr_half_glass",
+         "<bsdf type=\"openpbr\"><float name=\"specular_roughness\" value=\"0.5\"/><float "
+         "name=\"transmission_weight\" value=\"0.5\"/></bsdf>",
+         kLamp},
         {"roughdielectric", alpha("roughdielectric", "0.3"), kLamp},
         {"mirror_and_diffuse",
          two_sided("<bsdf type=\"blendbsdf\"><float name=\"weight\" value=\"0.4\"/><bsdf "

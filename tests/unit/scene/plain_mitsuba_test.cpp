@@ -415,6 +415,8 @@ TEST(PlainMitsuba, EveryApproximationIsReported) {
          "their geometric mean stands in"},
         {R"(<bsdf type="principled"><rgb name="specular_color" value="1 0.5 0.2"/></bsdf>)",
          "\"specular_weight\" and \"specular_color\""},
+        {R"(<bsdf type="openpbr"><float name="coat_weight" value="0.5"/></bsdf>)",
+         "\"principled\" stands in for it; white surfaces reflect 0.70 to 1.05"},
         {R"(<bsdf type="mixturebsdf"><string name="weights" value="0.9 0.4"/>
             <boolean name="ensure_energy_conservation" value="false"/><bsdf type="diffuse"/>
             <bsdf type="diffuse"/></bsdf>)",
@@ -484,6 +486,52 @@ TEST(PlainMitsuba, ReflectanceBecomesAnIndexOfRefraction) {
     make_plain_mitsuba(scene);
     EXPECT_NEAR(number(only(scene, "bsdf"), "eta"), 1.5, 0.01);
     EXPECT_FALSE(only(scene, "bsdf").find("specular_color"));
+}
+
+TEST(PlainMitsuba, OpenPbrBecomesPrincipled) {
+    SceneDescription scene = parsed(R"(<shape type="sphere"><bsdf type="openpbr">
+        <rgb name="base_color" value="0.8 0.4 0.2"/><float name="base_weight" value="0.5"/>
+        <float name="base_metalness" value="0.25"/><float name="specular_weight" value="0.25"/>
+        <float name="specular_roughness" value="0.6"/>
+        <float name="specular_roughness_anisotropy" value="0.45"/>
+        <float name="coat_weight" value="0.3"/><float name="coat_roughness" value="0.2"/>
+        <rgb name="coat_color" value="0.5"/><float name="fuzz_weight" value="0.7"/></bsdf></shape>)");
+    make_plain_mitsuba(scene);
+    const SceneObject& o = only(scene, "bsdf");
+    EXPECT_EQ(o.type, "principled");
+    EXPECT_EQ(*o.find("base_color")->as<Rgb>(), Rgb(0.4f, 0.2f, 0.1f));
+    for (const auto& [name, value] : {std::pair("metallic", 0.25),
+                                      {"roughness", 0.6},
+                                      {"eta", 11.0 / 9},
+                                      {"anisotropic", 0.5},
+                                      {"clearcoat", 0.3},
+                                      {"clearcoat_gloss", 0.06 / 0.099},
+                                      {"sheen", 0.7}})
+        EXPECT_NEAR(number(o, name), value, 1e-6) << name;
+    EXPECT_EQ(o.params.size(), 8u);
+}
+
+TEST(PlainMitsuba, ThinGlassOfOpenPbrIsABlendWithAPane) {
+    SceneDescription scene = parsed(R"(<shape type="sphere"><bsdf type="openpbr">
+        <rgb name="transmission_color" value="0.5 1 1"/><float name="transmission_weight" value="0.75"/>
+        <float name="specular_ior" value="1.4"/><boolean name="thin_walled" value="true"/></bsdf></shape>)");
+    make_plain_mitsuba(scene);
+    const auto of = [&](const char* type) {
+        for (const SceneObject& o : scene.objects)
+            if (o.type == type) return o;
+        throw std::runtime_error(type);
+    };
+    EXPECT_EQ(number(of("blendbsdf"), "weight"), 0.75);
+    EXPECT_EQ(number(of("thindielectric"), "int_ior"), 1.4);
+    EXPECT_EQ(*of("thindielectric").find("specular_transmittance")->as<Rgb>(), Rgb(0.5f, 1, 1));
+    EXPECT_EQ(number(of("principled"), "eta"), 1.4);
+    EXPECT_EQ(of("twosided").children.size(), 1u);
+    // Solid glass has the colour of the glass.
+    SceneDescription solid = parsed(R"(<shape type="sphere"><bsdf type="openpbr">
+        <rgb name="transmission_color" value="0.5 1 1"/><float name="transmission_weight" value="1"/></bsdf></shape>)");
+    make_plain_mitsuba(solid);
+    EXPECT_EQ(number(only(solid, "bsdf"), "spec_trans"), 1);
+    EXPECT_EQ(*only(solid, "bsdf").find("base_color")->as<Rgb>(), Rgb(0.5f, 1, 1));
 }
 
 TEST(PlainMitsuba, ColoursOfMeshesAreWrittenAsFloats) {

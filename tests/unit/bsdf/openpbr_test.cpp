@@ -1,0 +1,394 @@
+// The OpenPBR surface. False-alarm rate of the χ² tests of each TEST: 0.1 %.
+
+#include "bsdf/openpbr.h"
+
+#include "bsdf/conductor.h"
+#include "bsdf/dielectric.h"
+#include "bsdf/diffuse.h"
+#include "bsdf/roughconductor.h"
+#include "lobe_tests.h"
+#include "test_materials.h"
+
+namespace etendue {
+namespace {
+
+using namespace etendue::testing;
+using Values = std::vector<TestMaterials::Value>;
+using Children = std::vector<TestMaterials::Child>;
+
+/// A material and the lobes at a point that is seen from above.
+class Made {
+public:
+    explicit Made(const Values& values,
+                  const std::function<Children(TestMaterials&)>& textures = {})
+        : material_(
+              &materials_.make("openpbr", values, textures ? textures(materials_) : Children{})) {}
+
+    const Material& operator*() const { return *material_; }
+    Bsdf bsdf(Vec3 wo = {0, 0, 1}) { return material_->bsdf(plane_point(wo), arena_); }
+    /// The only lobe.
+    OpenPbrLobe lobe() {
+        const Bsdf made = bsdf();
+        EXPECT_EQ(made.front().next, nullptr);
+        return std::get<OpenPbrLobe>(made.front().lobe);
+    }
+
+private:
+    TestMaterials materials_;
+    ComponentArena arena_;
+    const Material* material_;
+};
+
+Values operator+(Values a, const Values& b) {
+    a.insert(a.end(), b.begin(), b.end());
+    return a;
+}
+
+const Values kWhite{{"base_color", Rgb(1)}};
+const Values kMetal{{"base_metalness", 1.0}}, kGlass{{"transmission_weight", 1.0}};
+const Values kCoat{{"coat_weight", 1.0}, {"coat_roughness", 0.3}},
+    kSmoothCoat{{"coat_weight", 0.7}, {"coat_ior", 1.8}},
+    kFuzz{{"fuzz_weight", 1.0}, {"fuzz_roughness", 0.3}};
+const Values kColors{{"base_color", Rgb(0.8f, 0.4f, 0.2f)},
+                     {"specular_color", Rgb(0.9f, 1, 0.5f)},
+                     {"transmission_color", Rgb(0.5f, 0.9f, 0.7f)}};
+
+Values rough(double r) {
+    return {{"specular_roughness", r}};
+}
+
+struct Named {
+    const char* name;
+    Values values;
+};
+/// Each slab and layer, in colours.
+std::vector<Named> all_lobes() {
+    const Values brushed{{"specular_roughness_anisotropy", 0.7}};
+    const Values layers{{"coat_weight", 0.8},
+                        {"coat_roughness", 0.2},
+                        {"coat_color", Rgb(0.9f, 0.7f, 0.5f)},
+                        {"fuzz_weight", 0.6},
+                        {"fuzz_color", Rgb(0.6f, 0.9f, 0.8f)}};
+    return {{"opaque", kColors},
+            {"rough opaque", kColors + rough(0.8) + Values{{"base_diffuse_roughness", 0.7}}},
+            {"smooth opaque", kColors + rough(0)},
+            {"dull", kColors + Values{{"specular_weight", 0.0}}},
+            {"metal", kColors + kMetal + rough(0.5)},
+            {"brushed metal", kColors + kMetal + rough(0.6) + brushed},
+            {"smooth metal under a rough coat", kColors + kMetal + rough(0) + kCoat},
+            {"metal under a smooth coat", kColors + kMetal + rough(0.7) + kSmoothCoat},
+            {"glass", kColors + kGlass + rough(0.4)},
+            {"rough glass", kColors + kGlass + rough(0.9)},
+            {"brushed glass", kColors + kGlass + rough(0.6) + brushed},
+            {"air in water", kColors + kGlass + rough(0.5) + Values{{"specular_ior", 0.75}}},
+            {"coated glass", kColors + kGlass + rough(0.5) + layers},
+            {"cloth", kColors + kFuzz},
+            {"opaque below all", kColors + rough(0.6) + layers},
+            {"metal below all", kColors + kMetal + layers}};
+}
+
+TEST(OpenPbr, SamplesMatchPdf) {
+    const std::vector<Vec3> directions = {direction(0, 0), direction(60, 130), direction(85, -70),
+                                          direction(120, 20)};
+    const double significance = sidak(1e-3, int(2 * all_lobes().size() * directions.size()));
+    for (const auto& [name, values] : all_lobes()) {
+        Made made(values);
+        for (const Vec3 wo : directions) {
+            SCOPED_TRACE(name);
+            expect_samples_match_pdf(made.lobe(), wo, significance, 30000);
+        }
+    }
+}
+
+// Reciprocity is part of expect_adjoint_symmetry().
+TEST(OpenPbr, ValueDensityAndWeightAgree) {
+    for (const auto& [name, values] : all_lobes()) {
+        SCOPED_TRACE(name);
+        Made made(values);
+        const OpenPbrLobe lobe = made.lobe();
+        for (const Vec3 wo : test_directions_both_sides()) {
+            expect_sample_agrees_with_eval(lobe, wo);
+            expect_adjoint_symmetry(lobe, wo);
+            expect_delta_events_reverse(lobe, wo);
+        }
+        expect_finite(lobe);
+    }
+}
+
+TEST(OpenPbr, SmoothPartsAreDeltaEvents) {
+    for (const auto& [values, has_smooth, has_delta] : std::vector<std::tuple<Values, bool, bool>>{
+             {kMetal + rough(0), false, true},
+             {kMetal + rough(0.2), true, false},
+             {kGlass + rough(0), false, true},
+             {rough(0), true, true},
+             {rough(0) + Values{{"specular_weight", 0.0}}, true, false},
+             {kMetal + rough(0) + kSmoothCoat, true, true},
+             {kMetal + rough(0.3) + kSmoothCoat, true, true},
+             {kMetal + rough(0) + kCoat, true, false}}) {
+        Made made(values);
+        EXPECT_EQ(made.lobe().has_smooth(), has_smooth);
+        EXPECT_EQ(made.lobe().has_delta(), has_delta);
+        EXPECT_EQ((*made).may_be_smooth(), has_smooth);
+    }
+}
+
+/// ∫ f of the smooth part and of the delta events; of sharp lobes beside wide ones the mean of samples.
+double albedo(const OpenPbrLobe& lobe, Vec3 wo, int channel = 1) {
+    if (lobe.has_smooth() && lobe.roughness() < 0.03f && lobe.slab != OpenPbrSlab::Glass)
+        return double(sampled_albedo(lobe, wo, 512).value[channel]);
+    double sum = lobe.has_smooth() ? integrated_albedo(lobe, wo, channel) : 0;
+    for (const bool transmits : {false, true})
+        if (const auto s = lobe.delta_event(wo, transmits))
+            sum += double(s->weight[channel] * s->pdf);
+    return sum;
+}
+
+struct Furnace {
+    const char* name;
+    Values values;
+    double above = 0.005, below = 0.005;
+};
+
+class OpenPbrFurnace : public ::testing::TestWithParam<Furnace> {};
+
+// In a white furnace, a white surface is invisible. At 1.1° from the horizon, nodes of the tables are far apart for some
+// roughnesses.
+TEST_P(OpenPbrFurnace, IsClosedForWhiteSurfaces) {
+    const auto& [name, values, above, below] = GetParam();
+    for (const double r : {0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.8, 1.0}) {
+        Made made(kWhite + values + rough(r));
+        const OpenPbrLobe lobe = made.lobe();
+        for (const float cos : {1.0f, 0.8f, 0.5f, 0.2f, 0.1f, -0.1f, -0.3f, -0.7f, -1.0f}) {
+            if (cos < 0 && lobe.slab != OpenPbrSlab::Glass) continue;
+            const double a = albedo(lobe, {std::sqrt(1 - sqr(cos)), 0, cos});
+            EXPECT_LE(a, 1 + above) << "roughness " << r << ", cosine " << cos;
+            EXPECT_GE(a, 1 - below) << "roughness " << r << ", cosine " << cos;
+        }
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    , OpenPbrFurnace,
+    ::testing::Values(Furnace{"Metal", kMetal}, Furnace{"Opaque", {}}, Furnace{"Glass", kGlass},
+                      Furnace{"HighIndex", {{"specular_ior", 3.0}}},
+                      Furnace{"GlassOfHighIndex", kGlass + Values{{"specular_ior", 2.4}}},
+                      Furnace{"AirInWater", kGlass + Values{{"specular_ior", 0.75}}},
+                      Furnace{"RoughDiffuse", {{"base_diffuse_roughness", 1.0}}},
+                      Furnace{"CoatedMetal", kMetal + kCoat}, Furnace{"CoatedOpaque", kCoat},
+                      Furnace{"CoatedGlass", kGlass + kCoat},
+                      Furnace{"SmoothlyCoatedMetal", kMetal + kSmoothCoat},
+                      Furnace{"SmoothlyCoatedGlass", kGlass + kSmoothCoat},
+                      Furnace{"FuzzyMetal", kMetal + kFuzz}, Furnace{"FuzzyOpaque", kFuzz},
+                      // The fuzz is taken to be over the slab alone.
+                      Furnace{"All", kCoat + kFuzz, 0.006, 0.015}),
+    [](const auto& tested) { return tested.param.name; });
+
+TEST(OpenPbr, AnisotropicMetalIsClosed) {
+    for (const double r : {0.3, 0.6, 1.0}) {
+        Made made(kWhite + kMetal + rough(r) + Values{{"specular_roughness_anisotropy", 0.8}});
+        for (const Vec3 wo :
+             {direction(0, 0), direction(40, 0), direction(40, 90), direction(70, 30)})
+            EXPECT_NEAR(albedo(made.lobe(), wo), 1, 0.005) << r << describe(wo);
+    }
+}
+
+// Textures make a table of rows, between which the albedo is interpolated.
+TEST(OpenPbr, TexturedRoughnessAndReflectanceAreClosed) {
+    for (const Values& slab : {kMetal, Values{}, kGlass}) {
+        float r = 0, weight = 0;
+        Made made(kWhite + slab, [&](TestMaterials& m) {
+            FunctionTexture roughness, specular;
+            roughness.color = [&](Vec2) { return Rgb(r); };
+            specular.color = [&](Vec2) { return Rgb(weight); };
+            return Children{{"specular_roughness", m.texture(roughness)},
+                            {"specular_weight", m.texture(specular)}};
+        });
+        for (const float rough_value : {0.05f, 0.33f, 0.71f, 0.98f})
+            for (const float weight_value : {0.2f, 0.6f, 3.0f}) {
+                r = rough_value;
+                weight = weight_value;
+                const OpenPbrLobe lobe = made.lobe();
+                for (const float cos : {1.0f, 0.6f, 0.2f, 0.1f})
+                    EXPECT_NEAR(albedo(lobe, {std::sqrt(1 - sqr(cos)), 0, cos}), 1, 0.005)
+                        << "roughness " << r << ", weight " << weight << ", cosine " << cos;
+            }
+    }
+}
+
+// Light that is in the ball meets the opaque half from behind.
+TEST(OpenPbr, HalfTransmissionIsClosedFromBothSides) {
+    for (const double share : {0.5, 0.9}) {
+        Made made(kWhite + rough(0.5) +
+                  Values{{"transmission_weight", share}, {"base_metalness", 0.3}});
+        EXPECT_TRUE((*made).is_transmissive() && (*made).is_two_sided());
+        for (const Vec3 wo : test_directions_both_sides()) {
+            const Bsdf bsdf = made.bsdf(wo);
+            double sum = 0;
+            for (const BsdfComponent* c = &bsdf.front(); c; c = c->next)
+                sum += double(c->weight) *
+                       albedo(std::get<OpenPbrLobe>(c->lobe), c->frame.to_local(wo));
+            EXPECT_NEAR(sum, 1, 0.005) << share << describe(wo);
+        }
+    }
+}
+
+TEST(OpenPbr, NeverGainsEnergy) {
+    LobeRandom random(9);
+    for (int i = 0; i < 60; ++i) {
+        const auto number = [&] { return double(random.next()); };
+        const auto color = [&] { return Rgb(random.next(), random.next(), random.next()); };
+        const auto maybe = [&] { return random.next() < 0.4f ? double(random.next()) : 0.0; };
+        const Values slab = i % 3 == 0 ? kMetal : i % 3 == 1 ? Values{} : kGlass;
+        Made made(slab + Values{{"base_color", color()},
+                                {"specular_color", color()},
+                                {"transmission_color", color()},
+                                {"specular_roughness", 0.1 + 0.9 * number()},
+                                {"specular_weight", 2 * number()},
+                                {"specular_ior", 1 + 2 * number()},
+                                {"base_diffuse_roughness", maybe()},
+                                {"coat_weight", maybe()},
+                                {"coat_color", color()},
+                                {"coat_roughness", number()},
+                                {"fuzz_weight", maybe()},
+                                {"fuzz_color", color()},
+                                {"fuzz_roughness", number()}});
+        for (const Vec3 wo :
+             {direction(5, 0), direction(60, 20), direction(80, 50), direction(140, 0)})
+            for (const int channel : {0, 2})
+                EXPECT_LE(albedo(made.lobe(), wo, channel), 1.005) << "set " << i << describe(wo);
+    }
+}
+
+TEST(OpenPbr, WithoutReflectionIsDiffuse) {
+    Made made(
+        {{"base_color", Rgb(0.2f, 0.6f, 0.3f)}, {"base_weight", 0.5}, {"specular_weight", 0.0}});
+    const DiffuseLobe diffuse{Rgb(0.1f, 0.3f, 0.15f)};
+    for (const Vec3 wo : test_directions_both_sides())
+        for (const Vec3 wi : test_directions_both_sides()) {
+            const BsdfEval a = made.lobe().eval(wo, wi), b = diffuse.eval(wo, wi);
+            EXPECT_TRUE(nearly(a.f, b.f, 1e-4, 1e-7)) << describe(wo) << describe(wi);
+            EXPECT_TRUE(nearly(a.pdf, b.pdf, 1e-4, 1e-7)) << describe(wo) << describe(wi);
+        }
+}
+
+TEST(OpenPbr, SmoothGlassIsADielectric) {
+    Made made(kGlass + rough(0) +
+              Values{{"transmission_color", Rgb(0.25f, 0.49f, 1)}, {"specular_ior", 1.7}});
+    const DielectricLobe reference{1.7f, Rgb(1), Rgb(0.5f, 0.7f, 1)};
+    for (const Vec3 wo : test_directions_both_sides())
+        for (const bool transmits : {false, true}) {
+            const auto a = made.lobe().delta_event(wo, transmits),
+                       b = reference.delta_event(wo, transmits);
+            ASSERT_EQ(a.has_value(), b.has_value()) << describe(wo);
+            if (!a) continue;
+            EXPECT_LT(length(a->wi - b->wi), 1e-6f);
+            EXPECT_TRUE(nearly(a->weight, b->weight, 1e-5, 0) && nearly(a->pdf, b->pdf, 1e-5, 0) &&
+                        nearly(a->pdf_rev, b->pdf_rev, 1e-5, 0))
+                << describe(wo);
+            EXPECT_EQ(a->eta, b->eta);
+        }
+}
+
+// At 0 roughness the mirror of a conductor; of low roughness, where little light is reflected twice, a rough conductor.
+TEST(OpenPbr, MetalIsAConductor) {
+    const ConductorLobe mirror{Rgb(0), Rgb(1), Rgb(1)};
+    Made smooth(kWhite + kMetal + rough(0)), low(kWhite + kMetal + rough(0.1));
+    const RoughConductorLobe ggx{{Microfacet::Kind::Ggx, 0.01f, 0.01f}, Rgb(0), Rgb(1), Rgb(1)};
+    for (const Vec3 wo : test_directions()) {
+        const auto a = smooth.lobe().sample(wo, 0.3f, {0.2f, 0.7f}),
+                   b = mirror.sample(wo, 0.3f, {0.2f, 0.7f});
+        ASSERT_TRUE(a && b && a->is_delta);
+        EXPECT_LT(length(a->wi - b->wi), 1e-6f);
+        EXPECT_TRUE(nearly(a->weight, b->weight, 1e-5, 0) && a->pdf == b->pdf);
+        const auto s = ggx.sample(wo, 0, {0.4f, 0.3f});
+        ASSERT_TRUE(s);
+        EXPECT_TRUE(nearly(low.lobe().eval(wo, s->wi).f, s->weight * s->pdf, 2e-3, 0))
+            << describe(wo);
+    }
+}
+
+// At 82° F82-tint has the given share of Schlick's approximation, at 0° the base colour.
+TEST(OpenPbr, MetalHasTheColourOfItsEdge) {
+    const Rgb base(0.9f, 0.5f, 0.1f), tint(0.3f, 0.8f, 1);
+    Made made(kMetal + rough(0) + Values{{"base_color", base}, {"specular_color", tint}});
+    const auto F = [&](float cos) {
+        const auto s = made.lobe().delta_event({std::sqrt(1 - sqr(cos)), 0, cos}, false);
+        return s->weight * s->pdf;
+    };
+    EXPECT_TRUE(nearly(F(1), base, 1e-5, 0));
+    const float c = 1 / 7.0f;
+    for (int i = 0; i < 3; ++i)
+        EXPECT_NEAR(F(c)[i], tint[i] * (base[i] + (1 - base[i]) * std::pow(1 - c, 5.0f)), 1e-5f);
+}
+
+// What does not leave at the facets is multiplied by the base colour once.
+TEST(OpenPbr, OpaqueAlbedoIsThatOfAlbedoScaling) {
+    for (const double r : {0.0, 0.4}) {
+        const auto of = [&](double base, const Vec3 wo) {
+            Made made(rough(r) + Values{{"base_color", Rgb(float(base))}});
+            return albedo(made.lobe(), wo);
+        };
+        for (const Vec3 wo : test_directions()) {
+            const double E = of(0, wo);
+            EXPECT_NEAR(of(0.3, wo), E + 0.3 * (1 - E), 0.002) << r << describe(wo);
+        }
+    }
+}
+
+TEST(OpenPbr, ReflectanceAtNormalIncidenceIsWeighted) {
+    const Vec3 n{0, 0, 1};
+    const auto F0 = [&](const Values& values) {
+        Made made(rough(0) + Values{{"base_color", Rgb(0)}} + values);
+        const auto s = made.lobe().delta_event(n, false);
+        return s ? s->weight * s->pdf : Rgb(0);
+    };
+    const auto weight = [](double w) { return Values{{"specular_weight", w}}; };
+    EXPECT_NEAR(F0({}).g, 0.04f, 1e-6f);
+    EXPECT_NEAR(F0(weight(0.25)).g, 0.01f, 1e-6f);
+    EXPECT_EQ(F0(weight(0)).g, 0);
+    EXPECT_NEAR(F0(weight(2)).g, 0.08f, 1e-6f);
+    EXPECT_NEAR(F0(weight(0.5) + Values{{"specular_ior", 0.6}}).g, 0.5f * sqr(0.4f / 1.6f), 1e-6f);
+    const Rgb tinted = F0({{"specular_color", Rgb(3, 1.5f, 0)}});
+    EXPECT_TRUE(nearly(tinted, Rgb(0.12f, 0.06f, 0), 1e-5, 1e-7)) << tinted.r << " " << tinted.g;
+}
+
+TEST(OpenPbr, ACoatColoursWhatLiesBelow) {
+    const Vec3 n{0, 0, 1};
+    Made made(kWhite + kMetal + rough(0) +
+              Values{{"coat_weight", 1.0}, {"coat_ior", 1.5}, {"coat_color", Rgb(0.5f, 0.8f, 1)}});
+    const auto s = made.lobe().delta_event(n, false);
+    ASSERT_TRUE(s);
+    EXPECT_TRUE(nearly(s->weight * s->pdf, Rgb(0.04f) + Rgb(0.5f, 0.8f, 1) * 0.96f, 1e-5, 0));
+}
+
+TEST(OpenPbr, MaterialReadsItsParameters) {
+    EXPECT_FALSE((*Made(Values{})).is_transmissive());
+    EXPECT_FALSE((*Made(Values{})).is_two_sided());
+    for (const TestMaterials::Value& wrong : Values{{"base_color", Rgb(1.5f)},
+                                                    {"specular_roughness", 1.5},
+                                                    {"coat_ior", 0.9},
+                                                    {"specular_ior", 0.0},
+                                                    {"fuzz_roughness", 2.0},
+                                                    {"specular_roughness_anisotropy", -0.1}})
+        EXPECT_THROW(Made(Values{{"coat_weight", 1.0}, {"fuzz_weight", 1.0}, wrong}), SceneError)
+            << wrong.name;
+    // Two components, with their shares.
+    const Bsdf both = Made(kMetal + rough(0.5)).bsdf();
+    EXPECT_EQ(both.front().weight, 1);
+    Made mixed(Values{{"base_metalness", 0.25}, {"transmission_weight", 0.4}});
+    const Bsdf three = mixed.bsdf();
+    float sum = 0;
+    int count = 0;
+    for (const BsdfComponent* c = &three.front(); c; c = c->next) sum += c->weight, ++count;
+    EXPECT_EQ(count, 3);
+    EXPECT_FLOAT_EQ(sum, 1);
+    Made thin(kGlass + Values{{"thin_walled", true}, {"transmission_color", Rgb(0.5f)}});
+    const Bsdf pane = thin.bsdf();
+    EXPECT_EQ(std::get<ThinDielectricLobe>(pane.front().lobe).transmittance, Rgb(0.5f));
+    // The sharpest lobe counts.
+    EXPECT_FLOAT_EQ(Made(rough(0.5)).lobe().roughness(), 0.25f);
+    EXPECT_FLOAT_EQ(Made(kMetal + rough(0.5) + kCoat).lobe().roughness(), 0.09f);
+}
+
+}  // namespace
+}  // namespace etendue
