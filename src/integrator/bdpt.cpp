@@ -21,7 +21,7 @@ void trace_light_path(const Bidirectional& paths, const SampleContext& c, const 
     for (int s = 1; s <= y.size() && s <= paths.max_depth(); ++s) {
         if (adds) paths.add(c, join_splat(c.scene, y, s, sampler, n), work);  // C(s,1)
         if (s >= 2) extend<TransportMode::Importance>(walk, sampler, y);
-        if (adds) paths.add(c, join_hit_lens(c.scene, y, s, n), work);  // C(s+1,0)
+        if (adds) paths.add_hit_lens(c, n, s, work);  // C(s+1,0)
     }
 }
 
@@ -53,6 +53,7 @@ void add_bdpt_joins(const Bidirectional& paths, const SampleContext& c, const Te
     for (int t = 2; t <= z.size(); ++t) {
         paths.add_hits(c, n, t, work);  // C(0,t)
         if (!paths.is_joinable(z, t)) continue;
+        paths.add_specular(c, n, t, work);                                 // X(s,t)
         paths.add(c, join_next_event(c.scene, z, t, c.sampler, n), work);  // C(1,t)
         if (!has_light_path) continue;
         const PhaseTimer of_connections(work.stats, &PhaseSeconds::connections);
@@ -81,7 +82,7 @@ namespace {
 class BdptIntegrator final : public Integrator {
 public:
     explicit BdptIntegrator(const IntegratorParams& p)
-        : paths_(p, Guiding(p)),
+        : paths_(p, Guiding(p), Specular(p)),
           given_light_paths_(uint64_t(p.integer("light_paths", 0, 1 << 30))) {}
 
     void learn(const LearnContext& pass) override { paths_.learn(pass); }
@@ -100,6 +101,7 @@ public:
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
         TechniqueCounts n = Bidirectional::counts(scene, light_paths);
         n.guide = paths_.guiding().guide();
+        n.specular_depth = paths_.specular().depth();
         return n;
     }
     uint64_t light_paths(const Scene& scene) const override {
@@ -125,6 +127,7 @@ IntegratorEntry bdpt_entry() {
                      {{"light_paths", ParamKind::Int, "0",
                        "Number of light paths in a pass; pixel i connects to light path i modulo "
                        "light_paths. 0: one for each pixel."}},
+                     Specular::params(),
                      Guiding::params()})},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<BdptIntegrator>(p);

@@ -22,9 +22,9 @@ std::vector<ParamInfo> Bidirectional::params() {
     return params;
 }
 
-Bidirectional::Bidirectional(const IntegratorParams& p, Guiding guiding)
-    : depth_(DepthOptions::from(p)), guiding_(std::move(guiding)), roulette_(p.number("roulette")),
-      is_optimised_(p.flag("eorr") && roulette_ > 0) {
+Bidirectional::Bidirectional(const IntegratorParams& p, Guiding guiding, const Specular& specular)
+    : depth_(DepthOptions::from(p)), guiding_(std::move(guiding)), specular_(specular),
+      roulette_(p.number("roulette")), is_optimised_(p.flag("eorr") && roulette_ > 0) {
     if (!(roulette_ >= 0 && roulette_ <= 1))
         throw std::runtime_error(fmt::format("{}: roulette must lie in [0, 1]", p.integrator()));
 }

@@ -3,6 +3,7 @@
 // shadow ray and the sink. bdpt.cpp has the loops over s and t.
 
 #include "integrator/guiding.h"
+#include "integrator/specular.h"
 #include "pathspace/eye_paths.h"
 #include "reuse/light_vertex_cache.h"
 
@@ -11,8 +12,9 @@ namespace etendue {
 class Bidirectional {
 public:
     static std::vector<ParamInfo> params();
-    /// `guiding` must be given if the integrator has the parameter Guiding::params().
-    explicit Bidirectional(const IntegratorParams& params, Guiding guiding = {});
+    /// `guiding` must be given if the integrator has the parameter Guiding::params(), and so must `specular`.
+    explicit Bidirectional(const IntegratorParams& params, Guiding guiding = {},
+                           const Specular& specular = {});
     /// Without Russian roulette of joins. Paths with fewer than `shortest` edges are left out.
     Bidirectional(const DepthOptions& depth, int shortest)
         : depth_(depth), shortest_(shortest), roulette_(0), is_optimised_(false) {}
@@ -48,6 +50,7 @@ public:
         guiding_.load(from);
     }
     const Guiding& guiding() const { return guiding_; }
+    const Specular& specular() const { return specular_; }
     /// Memory of a stored light vertex that needs `bytes` where nothing is guided.
     uint64_t vertex_bytes(uint64_t bytes) const {
         return bytes + (guiding_.is_on() ? LightVertexCache::kGuideBytes : 0);
@@ -80,8 +83,22 @@ public:
     void add_hits(const SampleContext& c, const TechniqueCounts& counts, int t,
                   const Workspace& work, float factor = 1) const {
         if (counts.hit > 0 && t - 1 >= shortest_)
-            for_each_hit(c.scene, work.z, t, counts,
-                         [&](const Join& j) { c.sink.add(j, j.contribution * factor); });
+            for_each_hit(c.scene, work.z, t, counts, [&](const Join& j) {
+                c.sink.add(specular_.weighed_hit(j, c.scene, work.z, t, counts),
+                           j.contribution * factor);
+            });
+    }
+    /// Adds C(s+1,0).
+    void add_hit_lens(const SampleContext& c, const TechniqueCounts& counts, int s,
+                      Workspace& work) const {
+        auto join = join_hit_lens(c.scene, work.y, s, counts);
+        if (join) specular_.weigh_hit_lens(*join, c.scene, work.y, s, counts);
+        add(c, join, work);
+    }
+    /// Adds X(s,t).
+    void add_specular(const SampleContext& c, const TechniqueCounts& counts, int t,
+                      Workspace& work) const {
+        specular_.add(c, t, depth_.max_depth, counts, work);
     }
 
     /// Adds the join, times `factor`, if it exists and passes test(), whose result is returned. If z_{t-1} has several
@@ -107,6 +124,7 @@ private:
 
     DepthOptions depth_;
     Guiding guiding_;
+    Specular specular_;
     int shortest_ = 1;  ///< Length of the shortest paths, in edges.
     float roulette_;  ///< Threshold of join_survival(), relative to the pixel's expected luminance.
     bool is_optimised_;              ///< Efficiency-optimised roulette, which sets thresholds_.

@@ -34,7 +34,7 @@ public:
         const SubPath& z = work.z;
         for (int t = 2; t <= z.size(); ++t) {
             for_each_hit(c.scene, z, t, counts, [&](const Join& j) {
-                c.sink.add(specular_.weighed_hit(j, c, z, t, counts, work.stats), j.contribution);
+                c.sink.add(specular_.weighed_hit(j, c.scene, z, t, counts), j.contribution);
             });
             if (t > depth_.max_depth) break;
             if (const auto j = join_next_event(c.scene, z, t, c.sampler, counts))

@@ -17,6 +17,7 @@ Vec3d normal_derivative(const SurfaceJet& at, Vec3d dp) {
 void ChainRay::arrive(const SurfaceJet& at) {
     const double t = dot(at.p - o, d), slope = dot(d, at.ng);
     o = at.p;
+    way += t;
     const auto moved = [&](Vec3d dp, Vec3d dd) {
         const Vec3d v = dp + dd * t;
         return v - d * (dot(v, at.ng) / slope);

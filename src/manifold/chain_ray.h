@@ -12,6 +12,7 @@ struct ChainRay {
     Vec3d o, d;  ///< d is a unit vector.
     /// Derivatives of o and d by the angles about the two axes TangentBasis of the first direction, in radians.
     Vec3d o1, o2, d1, d2;
+    double way = 0;  ///< Length of the ray up to `o`.
 
     /// Leaves the point `p` along the unit vector `w`.
     static ChainRay start(Vec3d p, Vec3d w) {

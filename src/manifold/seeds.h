@@ -1,5 +1,7 @@
 #pragma once
-// Seeds of Newton's method: chains of delta events that walks from an eye vertex meet.
+// Seeds of Newton's method: chains of delta events that random walks from an eye vertex meet.
+
+#include <vector>
 
 #include "manifold/chain.h"
 #include "sampler/sampler.h"
@@ -9,31 +11,41 @@ namespace etendue {
 struct ChainSeed {
     Vec3d w;  ///< Direction at the eye vertex.
     ChainEvents events;
+    /// What the path would contribute per unit of throughput at the eye vertex if the lamp's point lay in the direction of the
+    /// ray, and surfaces did not focus: a guess.
+    Rgb guess;
 };
 
 /// Draws seeds for chains between an eye vertex and a point on a lamp.
 class ChainSeeds {
 public:
-    /// `depth`: most events of a chain, at most ChainEvents::kMost.
-    ChainSeeds(const Vertex& from, const LampPoint& lamp, int depth, ChainTracer& tracer,
-               RenderStats& stats)
-        : from_(from), lamp_(lamp), depth_(depth), tracer_(tracer), stats_(stats) {}
+    /// `depth`: most events of a chain, at most ChainEvents::kMost. What is referred to must outlive this.
+    ChainSeeds(const Scene& scene, const Vertex& from, const LampPoint& lamp, int depth,
+               ChainTracer& tracer, RenderStats& stats);
 
-    /// A walk leaves the eye vertex in a direction of its own BSDF, without guide, and goes on by delta events. Of the
-    /// chains that lead from the eye vertex to a surface on this walk, one is chosen uniformly from those whose last
-    /// surface the lamp's point lights on the right side. Near a solution, all that is asked of a seed is true. Empty where there is none,
-    /// or where the seed is known to have other events than `only`.
+    /// A walk leaves the eye vertex and goes on by delta events: in a direction of its own BSDF, without guide, or toward a
+    /// random point of a shape that has delta events alone. Of the chains that lead from the eye vertex to a surface on this
+    /// walk, one is chosen uniformly among those from whose last surface the ray leaves on the side of the lamp's point,
+    /// which that surface sees. All that is asked of a seed is true near a solution, too, and directions of the BSDF reach
+    /// all solutions that contribute. So every solution that is not degenerate is found. Empty where the walk has no such
+    /// chain, or the seed is known to have other events than `only`.
     std::optional<ChainSeed> draw(Sampler& sampler, const ChainEvents* only = nullptr);
 
 private:
-    /// Whether the lamp lights the surface that the tracer has left, on the side to which the ray went.
-    bool may_end_here() const;
+    std::optional<Vec3d> first_direction(Sampler& sampler) const;
+    const ClearShape& choose_shape(float u) const;
+    /// L_e |cos θ| of the lamp toward the surface that the tracer has left, if the chain may end there.
+    Rgb emission_here() const;
 
+    const Scene& scene_;
     const Vertex& from_;
     const LampPoint& lamp_;
     int depth_;
     ChainTracer& tracer_;
     RenderStats& stats_;
+    /// Partial sums over the clear shapes of what is proportional to the probability of their choice; empty where there are
+    /// too many of them.
+    std::vector<float> sums_;
 };
 
 }  // namespace etendue

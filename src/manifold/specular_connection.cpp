@@ -12,7 +12,8 @@ double specular_weight(double ratio) {
 /// chain's first direction.
 double density_ratio(const LampPoint& lamp, const ChainRay& ray, double jacobian, double pdf) {
     const double cosine = lamp.is_infinite() ? 1 : std::fabs(dot(Vec3d(lamp.ng), ray.d));
-    return lamp.pdf / (pdf * jacobian * cosine);
+    const double length = lamp.is_infinite() ? 1 : ray.way + lamp.passed_by(ray).distance;
+    return kSolutionShare * spread(jacobian, length) * lamp.pdf / (pdf * jacobian * cosine);
 }
 
 /// Draws y_0; its density is 0 where it has none.
@@ -72,8 +73,7 @@ uint64_t count_trials(const Solution& found, const LampPoint& lamp, ChainSeeds& 
 }
 
 /// Makes `y` the light side of the path, from y_0 on.
-void record(const Vertex& from, const LampPoint& lamp, const Solution& found, ChainTracer& tracer,
-            SubPath& y) {
+void record(const LampPoint& lamp, const Solution& found, ChainTracer& tracer, SubPath& y) {
     y.clear();
     for (int i = 0; i <= found.events.count; ++i) y.append();
     Vertex& y0 = y[0];
@@ -93,7 +93,6 @@ void record(const Vertex& from, const LampPoint& lamp, const Solution& found, Ch
         v.event = tracer.vertex().event;
         v.is_delta = true;
     }
-    (void)from;
 }
 
 /// Follows a known chain of a path, from its eye vertex to its lamp.
@@ -152,24 +151,31 @@ std::optional<Join> join_specular(const Scene& scene, const SubPath& z, int t,
     const LampPoint lamp = draw_lamp_point(scene, sampler);
     if (!(lamp.pdf > 0)) return {};
     ChainTracer tracer(scene, from, work.stats);
-    ChainSeeds seeds(from, lamp, depth, tracer, work.stats);
+    ChainSeeds seeds(scene, from, lamp, depth, tracer, work.stats);
     sampler.seek(Stream::Auxiliary, kTrials | uint64_t(t));
     const auto seed = seeds.draw(sampler);
     if (!seed) return {};
+    // Russian roulette before Newton's method by what the path may contribute, and again when that is known.
+    // The guess may be far too low where light is focused.
+    constexpr float kLeast = 0.3f, kMargin = 3;
+    const float film_weight = std::fabs(z.film_weight);
+    const auto survives = [&](float q) { return q >= 1 || sampler.next_1d() < q; };
+    const Rgb f = from.eval_unguided(to_float(seed->w), TransportMode::Radiance).f;
+    const float guess = luminance(from.beta * f * seed->guess) / float(lamp.pdf) * film_weight,
+                q_guess = std::fmax(kLeast, join_survival(kMargin * guess, limits.threshold));
+    if (!survives(q_guess)) return {};
     const auto w = tracer.solve(seed->w, seed->events, lamp);
     if (!w) return {};
     auto found = evaluate(from, lamp, *w, seed->events, tracer);
     if (!found) return {};
-    const float share =
-        luminance(found->contribution) * float(found->weight) * std::fabs(z.film_weight);
-    const float q = join_survival(share, limits.threshold);
-    if (q < 1) {
-        if (!(sampler.next_1d() < q)) return {};
-        found->contribution *= 1 / q;
-    }
+    found->contribution *= 1 / q_guess;
+    const float share = luminance(found->contribution) * float(found->weight) * film_weight,
+                q = join_survival(share, limits.threshold);
+    if (!survives(q)) return {};
+    found->contribution *= 1 / q;
     ++work.stats.chains;
     const uint64_t trials = count_trials(*found, lamp, seeds, tracer, sampler, work);
-    if (work.is_observed) record(from, lamp, *found, tracer, work.pair);
+    if (work.is_observed) record(lamp, *found, tracer, work.pair);
     tracer.start(found->w);
     tracer.advance();
     return Join{.technique = {Strategy::Specular, found->events.count + 1, t},
@@ -183,7 +189,7 @@ std::optional<Join> join_specular(const Scene& scene, const SubPath& z, int t,
 }
 
 float hit_beside_specular(const Scene& scene, const SubPath& z, int t, const Emitter& emitter,
-                          const TechniqueCounts& counts, RenderStats&) {
+                          const TechniqueCounts& counts) {
     const int last = t - 1;
     int from = last - 1;  // the eye vertex before the chain
     while (from > 0 && z[from].is_delta) --from;
@@ -210,7 +216,7 @@ float hit_beside_specular(const Scene& scene, const SubPath& z, int t, const Emi
 }
 
 float hit_lens_beside_specular(const Scene& scene, const SubPath& y, int s,
-                               const TechniqueCounts& counts, RenderStats&) {
+                               const TechniqueCounts& counts) {
     int from = 1;
     while (from < s && y[from].is_delta) ++from;
     const int events = from - 1;

@@ -5,13 +5,23 @@
 // the chain again, whose mean is 1/P [Booth 2007]. Unbiased.
 //
 // X makes those paths of its method that otherwise hits alone make. Their weights cannot use P. They use
-// p̂ = p(y_0) Π P_j instead, with the probabilities P_j of the events, which are those of a hit, too.
+// p̂ = c p(y_0) J Π P_j instead, with a constant c, the spread J ≤ 1 of the chain, and the probabilities P_j of the events,
+// which are those of a hit, too.
 
 #include "manifold/seeds.h"
 #include "pathspace/join.h"
 #include "pathspace/sample_context.h"
 
 namespace etendue {
+
+/// P over Π P_j and the spread, as weights take it: in several scenes, where half of the seeds went toward clear shapes, the
+/// mean was 0.1 to 0.6, and a number of trials with the mean 1/P has the variance of P/2 samples.
+inline constexpr double kSolutionShare = 0.15;
+/// Where a chain spreads directions more than a straight ray of its length does, few seeds lead to each solution. `jacobian`: as
+/// Passing::jacobian(); at infinity `length` is 1.
+inline double spread(double jacobian, double length) {
+    return std::fmin(1, jacobian * sqr(length));
+}
 
 struct SpecularLimits {
     int max_depth;  ///< Most edges of a path.
@@ -31,9 +41,9 @@ std::optional<Join> join_specular(const Scene& scene, const SubPath& z, int t,
 
 /// Factor of the weight of C(0,t), the hit of `emitter` at z_{t-1}: 1 where no specular connection makes the path.
 float hit_beside_specular(const Scene& scene, const SubPath& z, int t, const Emitter& emitter,
-                          const TechniqueCounts& counts, RenderStats& stats);
+                          const TechniqueCounts& counts);
 /// The same of C(s+1,0), the hit of the lens by a ray from y_{s-1}.
 float hit_lens_beside_specular(const Scene& scene, const SubPath& y, int s,
-                               const TechniqueCounts& counts, RenderStats& stats);
+                               const TechniqueCounts& counts);
 
 }  // namespace etendue

@@ -313,9 +313,16 @@ private:
         scene_.shapes_ = top_;
         Accelerator& a = scene_.owned_->accelerator;
         a = Accelerator(options_.accelerator);
+        const auto add_bounds = [&](const SceneShape& s, const Bounds3& bounds, uint32_t instance) {
+            scene_.bounds_.extend(bounds);
+            if (!s.material->may_be_smooth() && s.material->is_opaque() &&
+                !s.material->perturbs_normals() && s.shape->primitive_count() > 0)
+                scene_.clear_shapes_.push_back(
+                    {s.shape, instance, bounds.center(), bounds.radius()});
+        };
         for (const SceneShape& s : top_) {
             a.add_shape(*s.shape);
-            scene_.bounds_.extend(s.shape->bounds());
+            add_bounds(s, s.shape->bounds(), kNoInstance);
         }
         std::vector<uint32_t> ids;
         for (const auto& group : groups_) {
@@ -325,13 +332,15 @@ private:
             scene_.shapes_.insert(scene_.shapes_.end(), group.begin(), group.end());
         }
         for (const auto& [group, to_world] : instances_) {
-            a.add_instance(ids[group], to_world);
+            const uint32_t instance = a.add_instance(ids[group], to_world);
             for (const SceneShape& s : groups_[group]) {
                 const Bounds3 b = s.shape->bounds();
+                Bounds3 world;
                 for (int corner = 0; corner < 8; ++corner)
-                    scene_.bounds_.extend(
+                    world.extend(
                         to_world.point({corner & 1 ? b.hi.x : b.lo.x, corner & 2 ? b.hi.y : b.lo.y,
                                         corner & 4 ? b.hi.z : b.lo.z}));
+                add_bounds(s, world, instance);
             }
         }
         if (!scene_.bounds_.is_empty()) check_extent(scene_.bounds_, {description_.file, 0});

@@ -133,6 +133,15 @@ std::optional<SurfaceJet> Scene::jet(const SurfaceLocation& at, Vec3d o, Vec3d d
     return j;
 }
 
+Vec3 Scene::point_on(const ClearShape& clear, float u_prim, Vec2 u) const {
+    const size_t n = clear.shape->primitive_count(),
+                 prim = std::min(size_t(double(u_prim) * double(n)), n - 1);
+    const Vec3 p = clear.shape->sample(uint32_t(prim), u).p;
+    return clear.instance == kNoInstance
+               ? p
+               : owned_->accelerator.instance(clear.instance).to_world.point(p);
+}
+
 float Scene::opacity(const SurfaceLocation& at) const {
     return opacity_of(shapes_[at.shape], surface(at));
 }

@@ -51,6 +51,14 @@ struct SceneShape {
     MediumId medium_toward(Vec3 ng, Vec3 d) const { return dot(ng, d) < 0 ? interior : exterior; }
 };
 
+/// A shape whose material has delta events alone, or one of those of an instance.
+struct ClearShape {
+    const Shape* shape;
+    uint32_t instance;  ///< kNoInstance outside of instances.
+    Vec3 center;        ///< Of a sphere around it, in world space.
+    float radius;
+};
+
 /// The media along a ray.
 struct Passage {
     MediumId medium = kVacuum;  ///< Input: at the origin. Output: where the ray ends.
@@ -119,6 +127,9 @@ public:
     /// Differential geometry where the line o + t·d meets the primitive at `location`, see Shape::jet().
     std::optional<SurfaceJet> jet(const SurfaceLocation& location, Vec3d o, Vec3d d,
                                   double near) const;
+    const std::vector<ClearShape>& clear_shapes() const { return clear_shapes_; }
+    /// A point of a clear shape: `u_prim` chooses a primitive uniformly, and `u` a point of it.
+    Vec3 point_on(const ClearShape& clear, float u_prim, Vec2 u) const;
     /// Probability that a ray meets the surface there.
     float opacity(const SurfaceLocation& location) const;
     const SceneShape& shape(uint32_t index) const { return shapes_[index]; }
@@ -215,7 +226,8 @@ private:
     std::string file_;
     std::shared_ptr<Owned> owned_;
     std::vector<SceneShape> shapes_;  ///< By the accelerator's shape index.
-    std::vector<Rgb> media_;          ///< Extinction σ_t, 1/length.
+    std::vector<ClearShape> clear_shapes_;
+    std::vector<Rgb> media_;  ///< Extinction σ_t, 1/length.
     std::vector<const Emitter*> infinite_;
     AliasTable selection_;
     std::shared_ptr<const Sensor> sensor_;

@@ -102,6 +102,15 @@ std::vector<Planted> planted() {
                                                  "value=\"3,3,3\"/></emitter>");
     // A caustic of a glass ball on the floor, from a lamp that eye paths hit often enough.
     const std::string by_glass = softly_lit + sphere("0,-0.2,0.1", "0.45", kGlass);
+    const std::string lantern = lantern_room(front_camera(kSize));
+    // From a point, a lamp is seen in either of two mirrors.
+    const std::string with_two_mirrors =
+        front_camera(kSize) + room() +
+        sphere("0,-0.1,0.2", "0.12",
+               diffuse("0.5,0.5,0.5") + "<emitter type=\"area\"><rgb name=\"radiance\" "
+                                        "value=\"9,9,9\"/></emitter>") +
+        rectangle("<translate z=\"-0.97\"/>", kMirror) +
+        rectangle("<rotate y=\"1\" angle=\"90\"/><translate x=\"-0.97\"/>", kMirror);
     return {
         {"EtaSquared", front_camera(kSize) + room() + lamp_in_glass(), "light",
          Image | Lengths | Techniques, 0},
@@ -137,6 +146,12 @@ std::vector<Planted> planted() {
         {"EmissionPmfNotInNextEvent", lamps, "bdpt:roulette=0,guide=random", Lengths, 0},
         {"CachedGuideLost", lit_room, "vcm:merges=false,roulette=0,guide=random", Lengths, 0},
         {"TrialsWithoutGuide", lit_room, "upg+bdpt:radius=0.3,roulette=0,guide=random", Lengths, 0},
+        {"ChainWithoutCurvature", lantern, "path:specular_connections=on", Lengths, 0},
+        {"ChainTrialsLeftOut", lantern, "path:specular_connections=on", Lengths, 0},
+        {"ChainNotInHits", lantern, "path:specular_connections=on", Lengths, 0},
+        {"ChainSolutionsConfused", with_two_mirrors, "path:specular_connections=on", Lengths, 0,
+         256},
+        {"ChainWithoutFresnel", lantern, "path:specular_connections=on", Lengths, 0},
         {"OnePercentOfOneLength", lit_room, "bdpt:roulette=0", Lengths, 0, 256},
         {"LostConnections", by_glass, "bdpt:roulette=0", Lengths, 0, 256},
         {"LostSplats", by_glass, "bdpt:roulette=0", Image | Lengths, 0, 256},

@@ -230,6 +230,63 @@ TEST(GatherChoices, AgreeWithPathTracing) {
             path, 0.08, choice);
 }
 
+/// Specular connections, on scenes whose lamps hits find often enough.
+class SpecularAgreement : public ::testing::TestWithParam<AgreementCase> {};
+
+TEST_P(SpecularAgreement, WithPathTracing) {
+    const AgreementCase& c = GetParam();
+    const Scene scene = build(c.xml);
+    const Tiles path = render_tiles(scene, "path:rr_depth=20,max_depth=8", {8 * c.passes, 4, 1});
+    for (const std::string method : {"path", "bdpt"})
+        expect_same_image(render_tiles(scene,
+                                       method + ":rr_depth=20,max_depth=8,specular_connections=on",
+                                       {2 * c.passes, 4, 2}),
+                          path, c.resolution, method);
+}
+
+/// A lamp as large as the ceiling.
+std::string ceiling_lamp() {
+    return rectangle("<scale value=\"0.9\"/><rotate x=\"1\" angle=\"90\"/><translate y=\"0.98\"/>",
+                     diffuse("0.5,0.5,0.5") + "<emitter type=\"area\"><rgb name=\"radiance\" "
+                                              "value=\"2,2,2\"/></emitter>");
+}
+
+std::vector<AgreementCase> specular_cases() {
+    const std::string front = front_camera(kAgreementSize), lit = room() + ceiling_lamp();
+    const std::string mirror = "<bsdf type=\"conductor\"/>";
+    const auto bumped = [](const std::string& bsdf) {
+        return "<bsdf type=\"bumpmap\"><texture type=\"checkerboard\"><transform "
+               "name=\"to_uv\"><scale value=\"3\"/></transform></texture><float name=\"scale\" "
+               "value=\"0.2\"/>" +
+               bsdf + "</bsdf>";
+    };
+    const std::string absorbing =
+        "<medium type=\"homogeneous\" name=\"interior\"><rgb name=\"sigma_t\" value=\"0.5,1.5,4\"/>"
+        "<float name=\"albedo\" value=\"0\"/></medium>";
+    const std::string masked_pane = rectangle(
+        "<scale value=\"0.7\"/><rotate x=\"1\" angle=\"90\"/><translate y=\"0.4\"/>", kMasked);
+    return {
+        {"lantern", lantern_room(front), false},
+        {"glass_ball", front + lit + sphere("0,-0.2,0.1", "0.45", kGlass), false},
+        // Caustics seen in a mirror, which no connection makes.
+        {"ball_and_mirror",
+         front + lit + sphere("0.3,-0.4,0.2", "0.4", kGlass) +
+             rectangle("<translate z=\"-0.98\"/>", "<bsdf type=\"twosided\">" + mirror + "</bsdf>"),
+         false},
+        {"thinlens_and_mirror",
+         lens_camera(kAgreementSize) + lit + sphere("0.3,-0.4,0.2", "0.4", kGlass) +
+             rectangle("<translate z=\"-0.98\"/>", "<bsdf type=\"twosided\">" + mirror + "</bsdf>"),
+         false},
+        {"tinted", front + lit + sphere("0,-0.2,0.1", "0.45", kGlass + absorbing), false},
+        {"mask", front + lit + masked_pane + sphere("0,-0.4,0.1", "0.45", kGlass), false},
+        {"bumped_glass", front + lit + sphere("0,-0.3,0.1", "0.45", bumped(kGlass)), false},
+        {"plastic", front + lit + sphere("0,-0.3,0.1", "0.6", kPlastic), false},
+        {"smooth_mesh", front + lit + smooth_mesh(kGlass), false},
+        {"environment",
+         front + room() + sphere("0,-0.2,0.1", "0.45", kGlass) + environment("1,1,1"), false},
+    };
+}
+
 TEST_P(Agreement, WithPathTracing) {
     expect_agreement(1, 2);
 }
@@ -270,6 +327,7 @@ const auto kName = [](const ::testing::TestParamInfo<AgreementCase>& p) {
     return std::string(p.param.name);
 };
 INSTANTIATE_TEST_SUITE_P(Quick, Agreement, ::testing::ValuesIn(cases()), kName);
+INSTANTIATE_TEST_SUITE_P(Quick, SpecularAgreement, ::testing::ValuesIn(specular_cases()), kName);
 INSTANTIATE_TEST_SUITE_P(Quick, ChainAgreement,
                          ::testing::ValuesIn(cases({"thinlens", "mask", "medium"})), kName);
 INSTANTIATE_TEST_SUITE_P(Long, ChainAgreement, ::testing::ValuesIn(cases()), kName);

@@ -450,6 +450,8 @@ TEST(ClosedForm, AbsorptionBehindOpenBoundaries) {
     }
 }
 
+const std::string kSpecular = ",specular_connections=on";
+
 /// Directional light through a glass plate onto the floor, seen from below the plate: only light paths sample it. Path
 /// lengths are limited to the shortest, without interreflection.
 TEST(ClosedForm, DirectionalLightThroughGlass) {
@@ -476,6 +478,94 @@ TEST(ClosedForm, DirectionalLightThroughGlass) {
             scene, {std::string("light") + c.depth, std::string("bdpt") + c.depth}, 3000,
             [&](float, float) { return kFloor * Rgb(3, 2, 1) * (0.8f * c.transmittance / kPi); },
             0.09);
+        expect_image(
+            scene, {std::string("path") + c.depth + kSpecular}, 1000,
+            [&](float, float) { return kFloor * Rgb(3, 2, 1) * (0.8f * c.transmittance / kPi); },
+            0.03);
+    }
+}
+
+// ---- Point lights behind delta events, which path tracing finds by specular connections alone.
+
+std::string point_light(const std::string& position) {
+    return "<emitter type=\"point\"><point name=\"position\" value=\"" + position +
+           "\"/><rgb name=\"intensity\" value=\"3,2,1\"/></emitter>";
+}
+
+/// The irradiance that a point light of unit intensity at height `above` makes at a distance `aside` below a glass pane of
+/// this width.
+double irradiance_below_pane(double aside, double above, double width, double& cos) {
+    const auto theta_in_glass = [](double theta) {
+        return std::asin(std::sin(theta) / double(kGlassEta));
+    };
+    const auto reach = [&](double theta) {
+        return (above - width) * std::tan(theta) + width * std::tan(theta_in_glass(theta));
+    };
+    double low = 0, high = 1.5;
+    for (int i = 0; i < 100; ++i) (reach((low + high) / 2) < aside ? low : high) = (low + high) / 2;
+    const double theta = std::max(low, 1e-6), step = 1e-7,
+                 slope = (reach(theta + step) - reach(theta - step)) / (2 * step);
+    cos = std::cos(theta);
+    // dω/dA on the floor
+    return std::sin(theta) / (reach(theta) * slope);
+}
+
+TEST(SpecularConnections, PointLightBehindAPane) {
+    const Scene scene =
+        build(camera_above("perspective", 1) + floor_of(kFloor) +
+              "<shape type=\"cube\"><transform name=\"to_world\"><scale x=\"9\" y=\"9\" "
+              "z=\"0.25\"/><translate z=\"3\"/></transform><bsdf type=\"dielectric\">" +
+              kPlainGlass + "</shape>" + point_light("0.3,-0.2,4"));
+    expect_image(
+        scene, {"path:max_depth=4" + kSpecular}, 8192,
+        [](float x, float y) {
+            const Vec3 p = on_plane(1, x, y);
+            double cos;
+            const double E = irradiance_below_pane(std::hypot(p.x - 0.3, p.y + 0.2), 4, 0.5, cos);
+            const float T = 1 - fresnel_dielectric(float(cos), kGlassEta).R;
+            return kFloor * Rgb(3, 2, 1) * (float(E) * sqr(T) * kInvPi);
+        },
+        0.03);
+}
+
+/// The image of the light in a mirror, and the light itself.
+TEST(SpecularConnections, PointLightBelowAMirror) {
+    const Scene scene = build(
+        camera_above("perspective", 1) + floor_of(kFloor, 1.5f) +
+        rectangle("<scale value=\"9\"/><rotate x=\"1\" angle=\"180\"/><translate z=\"3\"/>",
+                  "<bsdf type=\"conductor\"><string name=\"material\" value=\"none\"/></bsdf>") +
+        point_light("0.3,-0.2,2.5"));
+    expect_image(
+        scene, {"path:max_depth=3" + kSpecular}, 1024,
+        [](float x, float y) {
+            float E = 0;
+            for (const float height : {2.5f, 3.5f}) {
+                const Vec3 v = Vec3{0.3f, -0.2f, height} - on_plane(1, x, y);
+                E += height / std::pow(length(v), 3.0f);
+            }
+            return kFloor * Rgb(3, 2, 1) * (E * kInvPi);
+        },
+        0.03);
+}
+
+/// At the centre of a glass ball, light leaves straight, or returns to the centre and leaves on the other side.
+TEST(SpecularConnections, PointLightInAGlassBall) {
+    const Scene scene = build(camera_above("perspective", 1) + floor_of(kFloor, 1.5f) +
+                              "<shape type=\"sphere\"><point name=\"center\" value=\"0.2,0.1,3\"/>"
+                              "<float name=\"radius\" value=\"0.4\"/><bsdf type=\"dielectric\">" +
+                              kPlainGlass + "</shape>" + point_light("0.2,0.1,3"));
+    const float R = fresnel_dielectric(1, kGlassEta).R;
+    float returning = 0;
+    for (const int events : {1, 2}) {
+        returning += std::pow(R, float(events - 1));
+        expect_image(
+            scene, {fmt::format("path:max_depth={}{}", events + 2, kSpecular)}, 1024,
+            [&](float x, float y) {
+                const Vec3 v = Vec3{0.2f, 0.1f, 3} - on_plane(1, x, y);
+                return kFloor * Rgb(3, 2, 1) *
+                       ((1 - R) * returning * v.z / std::pow(length(v), 3.0f) * kInvPi);
+            },
+            0.03);
     }
 }
 

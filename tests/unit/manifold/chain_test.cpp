@@ -99,7 +99,7 @@ TEST_P(Chains, DerivativesAreLimitsOfDifferences) {
         ComponentArena arena;
         set_floor_vertex(scene, random_point(), v, arena);
         ChainTracer tracer(scene, v, stats);
-        ChainSeeds seeds(v, lamp, 4, tracer, stats);
+        ChainSeeds seeds(scene, v, lamp, 4, tracer, stats);
         for (int k = 0; k < 200; ++k) {
             const auto seed = seeds.draw(sampler);
             if (!seed || !tracer.follow(seed->w, seed->events)) continue;
@@ -142,7 +142,7 @@ TEST_P(Chains, SolutionsAreIsolated) {
         ComponentArena arena;
         set_floor_vertex(scene, random_point(), v, arena);
         ChainTracer tracer(scene, v, stats);
-        ChainSeeds seeds(v, lamp, 4, tracer, stats);
+        ChainSeeds seeds(scene, v, lamp, 4, tracer, stats);
         std::vector<Found> found;
         for (int k = 0; k < 1500; ++k) {
             const auto seed = seeds.draw(sampler);
@@ -184,7 +184,7 @@ double jacobian(const Scene& scene, Vec3 at, const LampPoint& lamp, int count) {
     RenderStats stats;
     set_floor_vertex(scene, at, v, arena);
     ChainTracer tracer(scene, v, stats);
-    ChainSeeds seeds(v, lamp, 4, tracer, stats);
+    ChainSeeds seeds(scene, v, lamp, 4, tracer, stats);
     Sampler sampler(SamplerKind::Independent, 2);
     sampler.start(0, 0);
     sampler.seek(Stream::Auxiliary, 0);

@@ -128,12 +128,17 @@ TEST_P(SpecularWeights, AreThoseOfTheDefinition) {
                                      .pdf = 1};
                 const double J = jacobian_of_differences(scene, z[t - 1], Vec3d(w), events, lamp),
                              cosine = x0.is_infinite ? 1 : double(abs_dot(x0.ng, x0.wo));
-                pdfs.specular_ratio = double(x->emitter->selection_pmf) * double(e.pdf_y0) /
+                double way = 1;
+                if (!x0.is_infinite) {
+                    way = 0;
+                    for (int i = t; i < z.size(); ++i) way += double(length(z[i].p - z[i - 1].p));
+                }
+                pdfs.specular_ratio = kSolutionShare * spread(J, way) *
+                                      double(x->emitter->selection_pmf) * double(e.pdf_y0) /
                                       (double(f.pdf) * J * cosine);
                 const double of_x = mis_weight(pdfs, x->technique, counts),
                              of_hit = mis_weight(pdfs, {Strategy::Hit, 0, z.size()}, counts);
-                const float beside =
-                    hit_beside_specular(scene, z, z.size(), *x->emitter, counts, work.stats);
+                const float beside = hit_beside_specular(scene, z, z.size(), *x->emitter, counts);
                 EXPECT_NEAR(double(x->mis_weight), of_x, 2e-3);
                 EXPECT_NEAR(double(hit->mis_weight * beside), of_hit, 2e-3);
                 EXPECT_NEAR(of_x + of_hit, 1, 1e-6) << "nothing else makes the path";
