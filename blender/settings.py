@@ -78,8 +78,9 @@ def register() -> None:
         _groups[_key(plugin["name"])] = group = _make_group(plugin)
         bpy.utils.register_class(group)
     items = [(p["name"], p["name"], p["doc"].rstrip(".")) for p in plugins] or [("none", "none", "etendue is missing")]
+    default = "auto" if plugins else "none"
     annotations = {
-        "integrator": EnumProperty(name="Integrator", description="Method of light transport", items=items),
+        "integrator": EnumProperty(name="Integrator", description="Method of light transport", items=items, default=default),
         "samples": IntProperty(name="Samples", description="Samples per pixel", default=64, min=1),
         "time": FloatProperty(name="Time", description="Ends the rendering after this many seconds; 0: no limit",
                               default=0, min=0, subtype="TIME_ABSOLUTE"),

@@ -385,7 +385,7 @@ def render(
 
     scene: a Scene, or a Description, a dict as load_dict() takes it, or a file, which is built first.
     integrator: a name with parameters, such as "upg+bdpt:max_depth=12"; the same as a dict or by integrator(); "" for the
-        integrator of the scene; or an Integrator.
+        integrator of the scene, or "auto" if it names none; or an Integrator.
     spp, time, error: limits: samples per pixel, seconds, relative error of the image (see Result.error). The first limit
         that is reached ends the rendering. Without a limit, the samples per pixel of the scene, or 64.
     seed: seed of all random numbers.

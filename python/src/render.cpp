@@ -63,7 +63,8 @@ RenderSettings with_method(const Scene& scene, const RenderSettings& settings,
     if (!earlier.empty()) {
         const MethodChoice choice = MethodChoice::from_json(earlier);
         RenderSettings chosen = with_chosen_method(settings, choice);
-        if (chosen.integrator.to_string() == choice.chosen)
+        const IntegratorSpec same = choose_integrator(scene, choice.chosen);
+        if (!chosen.choice && chosen.integrator.to_string() == same.to_string())
             chosen.choice = std::make_shared<const MethodChoice>(choice);
         return chosen;
     }

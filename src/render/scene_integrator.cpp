@@ -190,7 +190,7 @@ private:
 }  // namespace
 
 SceneIntegrator scene_integrator(const Scene& scene) {
-    if (!scene.defaults().integrator) return {{"path", {}}, {}};
+    if (!scene.defaults().integrator) return {{auto_entry().info.name, {}}, {}};
     return Reader(scene).read();
 }
 

@@ -10,7 +10,7 @@
 namespace etendue {
 
 struct SceneIntegrator {
-    IntegratorSpec spec;                ///< `path` if the file names none.
+    IntegratorSpec spec;                ///< `auto` if the file names none.
     std::vector<std::string> warnings;  ///< What of the file's integrator is replaced or ignored.
 };
 

@@ -126,6 +126,7 @@ def test_the_time_ends_the_rendering(studio, monkeypatch):
 def test_integrators_and_their_parameters_come_from_the_tables():
     settings, addon = bpy.context.scene.etendue, sys.modules["etendue_addon.settings"]
     assert addon.integrators() == [p["name"] for p in et.plugins("integrator")]
+    assert settings.bl_rna.properties["integrator"].default == "auto"
     settings.integrator, settings.depth = "upg+bdpt", 12
     group = addon.group_of(settings, "upg+bdpt")
     group.radius, group.guide = 0.05, "on"

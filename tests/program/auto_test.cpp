@@ -1,7 +1,10 @@
 // `auto` in the program: what it says, and that its images are those of the method that it has chosen.
 
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <thread>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -94,6 +97,30 @@ TEST_F(AutoTest, GoesOnWithTheMethodOfTheCheckpoint) {
         run(rendering("part", {"-i", "auto:consistent=true", "--spp", "300", "--resume", "auto"}));
     EXPECT_EQ(r.status, 1);
     EXPECT_NE(r.errors.find("chains=false"), std::string::npos) << r.errors;
+}
+
+TEST_F(AutoTest, RendersScenesThatNameNoIntegrator) {
+    const std::string file = path("scene.xml");
+    std::ofstream(file)
+        << R"(<scene version="3.0.0"><sensor type="perspective"/><emitter type="constant"/></scene>)";
+    const ProgramResult r =
+        run({"render", file, "-o", path("a.exr"), "--resolution", "8x6", "--spp", "2"});
+    EXPECT_EQ(r.status, 0) << r.errors;
+    EXPECT_NE(r.errors.find("auto: bdpt, without pilots"), std::string::npos) << r.errors;
+}
+
+/// As while a scene is loaded: there is nothing to write yet.
+TEST_F(AutoTest, InterruptsOfPilotsEndTheProgram) {
+    const Program program(ETENDUE_PROGRAM,
+                          {"render", scene, "-o", path("a.exr"), "-i", "auto", "--time", "100000"},
+                          folder.path());
+    std::this_thread::sleep_for(std::chrono::seconds(1));
+    program.interrupt();
+    const auto begin = std::chrono::steady_clock::now();
+    const ProgramResult r = program.wait();
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
+    EXPECT_EQ(r.status, 130) << r.errors;
+    EXPECT_FALSE(fs::exists(path("a.exr")));
 }
 
 TEST_F(AutoTest, PartsCanBeMergedAndPartsOfOtherMethodsCannot) {

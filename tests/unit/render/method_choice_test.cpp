@@ -150,7 +150,7 @@ TEST(MethodChoice, PilotsTakeASmallPart) {
     }
     // With guides and all chains.
     const Scene ring = scene_of_project("ring.xml", 480, 360);
-    for (const double seconds : {10.0, 16.0, 30.0}) {
+    for (const double seconds : {10.0, 14.0, 30.0}) {
         SCOPED_TRACE(seconds);
         EXPECT_LE(choice_of(ring, "auto", seconds).pilots, 0.085 * seconds);
     }
@@ -191,6 +191,25 @@ TEST(MethodChoice, CandidatesAreThoseThatMayBe) {
               "<emitter type=\"point\"><point name=\"position\" value=\"0,0.5,0\"/></emitter>");
     EXPECT_EQ(methods_of(choice_of(lit_by_point)),
               (Names{"bdpt", "mlt", "mmlt", "pcbpt", "upg+bdpt"}));
+}
+
+/// What is rendered without a word about the method, also where there is little to render, or no light.
+TEST(MethodChoice, IsTheDefaultOfScenesWithoutIntegrator) {
+    for (const int size : {1, 2, 40})
+        for (const std::string& light : {std::string(), area_lamp()})
+            for (const uint64_t spp : {1u, 3u, 2000u}) {
+                const Scene scene = build(front_camera(size) + room() + light);
+                RenderRequest request;
+                request.spp = spp;
+                request.threads = 1;
+                Renderer r(scene, settings_of(request, scene));
+                ASSERT_TRUE(r.settings().choice);
+                EXPECT_EQ(r.settings().choice->message().find("nan"), std::string::npos);
+                r.run(
+                    {.spp = 1, .seconds = {}, .error = {}}, [](const Progress&) {},
+                    std::atomic<bool>{false});
+                EXPECT_EQ(r.film().passes(), 1u);
+            }
 }
 
 /// Those of which there was no time for pilots are told, too.

@@ -185,7 +185,7 @@ TEST(SceneIntegrator, TablesHaveTheDefaultsThatHold) {
 
 TEST(SceneIntegrator, NeverStopsTheScene) {
     EXPECT_EQ(chosen_method(scene_with(integrator("no_such")), "bdpt"), "bdpt");
-    EXPECT_EQ(chosen_method(scene_with("")), "path");
+    EXPECT_EQ(chosen_method(scene_with("")), "auto");
     EXPECT_EQ(chosen_method(scene_with(integrator("adaptive"))), "path");
     const Scene lenient = scene_with(integrator("no_such"), true);
     EXPECT_EQ(chosen_method(lenient), "path");
