@@ -25,8 +25,8 @@ std::optional<PowerLaw> fit_power_law(std::span<const double> times, std::span<c
                                       double from = 0);
 
 /// Efficiency 1 / (squared error · time) [Veach 1997, §2.3.2] of a method relative to another one, from the products of
-/// squared error and time of their runs. The interval, for two runs or more, assumes normally distributed logarithms. Empty where the mean of
-/// the products is not positive.
+/// squared error and time of their runs. The interval, for two runs or more, assumes normally distributed logarithms.
+/// Empty where the mean of the products is not positive.
 struct Efficiency {
     double value = 0;
     std::optional<Interval> interval;
