@@ -160,7 +160,8 @@ TEST_F(RenderTest, MemoryIsLimited) {
         << stacks.errors;
     EXPECT_TRUE(has_earlier_image());
     EXPECT_EQ(run({"--memory", "600mb", "--spp", "1", "--threads", "2"}).status, 0);
-    EXPECT_EQ(run({"--memory", "800M", "--spp", "1", "--threads", "64"}).status, 0);
+    // The stacks, and what allocators reserve: about 400 MiB, more or less by the threads that come to load the scene.
+    EXPECT_EQ(run({"--memory", "1000M", "--spp", "1", "--threads", "64"}).status, 0);
 }
 
 /// Where the passes succeed, so does what follows them: statistics are written even if an image is not.
