@@ -39,7 +39,7 @@ void checkpoint_info(const std::string& file, bool as_json) {
     c.check();
     const CheckpointHeader& h = c.header();
     const RenderTotals totals = c.totals(false);
-    const std::span<const Film::Moments> moments = totals.film->moments();
+    const std::span<const PixelMoments> moments = totals.film->moments();
     const std::string bits = fmt::format(
         "{:016x}", ContentHash()
                        .add({reinterpret_cast<const char*>(moments.data()), moments.size_bytes()})

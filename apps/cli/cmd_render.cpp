@@ -112,7 +112,7 @@ private:
     }
     void write_denoised(const Job& job, const nlohmann::json& report) const;
     /// Writes the image elsewhere if it cannot be written to `output`.
-    void write_image_somewhere(const Image& image, std::vector<std::string>& failures) const;
+    void write_image_somewhere(const ImageRows& image, std::vector<std::string>& failures) const;
     /// Whether the image goes to a device or a pipe, which take it once.
     bool is_in_place() const {
         std::error_code error;
@@ -332,7 +332,7 @@ bool attempt(std::vector<std::string>& failures, const Task& task) {
     return false;
 }
 
-void RenderCommand::write_image_somewhere(const Image& image,
+void RenderCommand::write_image_somewhere(const ImageRows& image,
                                           std::vector<std::string>& failures) const {
     namespace fs = std::filesystem;
     if (attempt(failures, [&] { display.write(output, image); })) return;
@@ -356,15 +356,15 @@ std::vector<std::string> RenderCommand::write_outputs(const Renderer& renderer,
     const bool has_variance = std::find(aovs.begin(), aovs.end(), "variance") != aovs.end();
     const bool has_layers = has_variance || !layers.empty();
     const auto write_layers = [&] {
-        display.write(output, image_with_layers(renderer.film(), layers, has_variance, report));
+        display.write(output, image_rows(renderer.film(), layers, has_variance, report));
     };
     // The image alone needs the least memory and space. The one with layers replaces it, except in devices and pipes.
     if (is_in_place() && has_layers)
         attempt(failures, write_layers);
     else if (attempt(failures,
                      [&] {
-                         write_image_somewhere(
-                             image_with_layers(renderer.film(), {}, false, report), failures);
+                         write_image_somewhere(image_rows(renderer.film(), {}, false, report),
+                                               failures);
                      }) &&
              failures.empty() && has_layers && !attempt(failures, write_layers))
         failures.back() += fmt::format("; {} has the image without further layers", output);
@@ -380,7 +380,7 @@ void RenderCommand::write_denoised(const Job& job, const nlohmann::json& report)
     const auto begin = std::chrono::steady_clock::now();
     display.write(
         denoised_file(),
-        job.denoiser->denoise(image_with_layers(job.renderer->film(), job.guides, false, report),
+        job.denoiser->denoise(to_image(image_rows(job.renderer->film(), job.guides, false, report)),
                               job.settings.threads));
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
     if (!quiet)
@@ -567,9 +567,8 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
                 });
                 write_if_due(images, goes_on, [&] {
                     display.write(
-                        output,
-                        image_with_layers(renderer.film(), job.layers, has_variance,
-                                          to_json(renderer, s, job.settings, "unfinished", log)));
+                        output, image_rows(renderer.film(), job.layers, has_variance,
+                                           to_json(renderer, s, job.settings, "unfinished", log)));
                 });
             },
             interrupts.stop, interrupts.drop));

@@ -17,9 +17,10 @@ struct TonemapCommand {
     void run() const {
         check_image_extension(output);
         display.check();
-        const RgbImage image = read_rgb(input, layer);
-        write_image(output, rgb_image(image.width, image.height,
-                                      tone_map(image.pixels, display.mapping(image.pixels))));
+        RgbImage image = read_rgb(input, layer);
+        const ToneCurve map = display.curve(finite_luminances(image.pixels));
+        for (Rgb& c : image.pixels) c = map(c);
+        write_image(output, rgb_image(image.width, image.height, image.pixels));
     }
 };
 

@@ -1,5 +1,6 @@
 #include "display_options.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -57,15 +58,33 @@ std::optional<float> DisplayOptions::stops() const {
     return value;
 }
 
-ToneMapping DisplayOptions::mapping(std::span<const Rgb> pixels) const {
+ToneCurve DisplayOptions::curve(std::vector<float> luminances) const {
+    const float largest =
+        luminances.empty() ? 0 : *std::max_element(luminances.begin(), luminances.end());
     const std::optional<float> given = stops();
-    return {*tone_operator(op), given ? *given : auto_exposure(pixels), white};
+    return {{*tone_operator(op), given ? *given : auto_exposure(std::move(luminances)), white},
+            largest};
 }
 
-void DisplayOptions::write(const std::string& path, const Image& image) const {
+void DisplayOptions::write(const std::string& path, const ImageRows& image) const {
     if (image_extension(path) != ".png") return write_image(path, image);
-    const std::vector<Rgb> pixels = rgb_pixels(image);
-    write_image(path, rgb_image(image.width, image.height, tone_map(pixels, mapping(pixels))));
+    std::vector<float> luminances;
+    luminances.reserve(size_t(image.width) * size_t(image.height));
+    for_each_rgb_row(image, [&](int, std::span<const Rgb> row) {
+        for (const float y : finite_luminances(row)) luminances.push_back(y);
+    });
+    const ToneCurve map = curve(std::move(luminances));
+    const RgbChannels rgb = rgb_channels(image.channels);
+    ImageRows mapped{image.width, image.height, {"R", "G", "B"}, {}, {}};
+    std::vector<float> row(size_t(image.width) * image.channels.size());
+    mapped.make = [&](int y, std::span<float> to) {
+        image.make(y, row);
+        for (size_t x = 0; x < size_t(image.width); ++x) {
+            const Rgb c = map(rgb.of(&row[x * image.channels.size()]));
+            for (int i = 0; i < 3; ++i) to[3 * x + size_t(i)] = c[i];
+        }
+    };
+    write_image(path, mapped);
 }
 
 }  // namespace etendue

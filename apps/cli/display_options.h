@@ -24,9 +24,11 @@ struct DisplayOptions {
     /// Throws UsageError where they have no meaning.
     void check() const { stops(); }
 
-    ToneMapping mapping(std::span<const Rgb> pixels) const;
+    /// For an image with these luminances.
+    ToneCurve curve(std::vector<float> luminances) const;
     /// Writes the image; a .png is mapped first.
-    void write(const std::string& path, const Image& image) const;
+    void write(const std::string& path, const ImageRows& image) const;
+    void write(const std::string& path, const Image& image) const { write(path, rows_of(image)); }
 
 private:
     /// Empty for "auto".

@@ -26,7 +26,7 @@ Image = NDArray[np.float32]
 
 
 class FilmView:
-    """Sums over the passes: after the rendering, read-only views of the film's memory, without copies; in callbacks, copies
+    """Moments over the passes: after the rendering, read-only views of the film's memory, without copies; in callbacks, copies
     that later passes do not change. In other threads they cannot be read while it runs (RuntimeError).
     """
 
@@ -39,9 +39,9 @@ class FilmView:
         return self._rendering.sums()
 
     @property
-    def squares(self) -> NDArray[np.float64]:
-        """Sum of the squares of each pixel's radiance over the passes, shape (H, W, 3)."""
-        return self._rendering.squares()
+    def deviations(self) -> NDArray[np.float32]:
+        """Root of the sum over the passes of the squared difference between a pixel's radiance and its mean, shape (H, W, 3)."""
+        return self._rendering.deviations()
 
     @property
     def passes(self) -> int:
@@ -155,7 +155,7 @@ class Result:
 
     @property
     def film(self) -> FilmView:
-        """Sums and sums of squares over the passes, without copies, of shape (H, W, 3)."""
+        """Sums and deviations over the passes, without copies, of shape (H, W, 3)."""
         return FilmView(self._rendering)
 
     @property

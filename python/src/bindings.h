@@ -53,7 +53,6 @@ void watch_forks();
 
 /// A NumPy array of the vector's elements, `channels` floats each, which owns them: nothing is copied.
 using FloatArray = nb::ndarray<nb::numpy, float>;
-using ReadOnlyDoubles = nb::ndarray<nb::numpy, const double>;
 FloatArray to_array(std::vector<Rgb>&& pixels, int width, int height);
 FloatArray to_array(std::vector<float>&& values, int width, int height);
 /// A small array with a copy of the values.

@@ -234,18 +234,18 @@ public:
     nlohmann::json report() const {
         return to_json(renderer(), scene_->scene, settings_, stopped_by_, log_);
     }
-    void save(const std::string& file, const std::vector<std::string>& aovs) const {
+    void save(const std::string& file, const std::vector<std::string>& names) const {
         check_image_extension(file);
         use_threads();
-        write_image(file, image_with_layers(renderer(), scene_->scene, settings_.seed,
-                                            settings_.threads, aovs, report()));
+        const std::vector<AovImage> layers = aovs(names);
+        const bool has_variance = std::find(names.begin(), names.end(), "variance") != names.end();
+        write_image(file, image_rows(film(), layers, has_variance, report()));
     }
     Image denoised(const std::string& library) const {
         use_threads();
-        return Denoiser(library).denoise(
-            image_with_layers(renderer(), scene_->scene, settings_.seed, settings_.threads,
-                              {"denoise_albedo", "denoise_normal"}, report()),
-            settings_.threads);
+        const std::vector<AovImage> layers = aovs({"denoise_albedo", "denoise_normal"});
+        return Denoiser(library).denoise(to_image(image_rows(film(), layers, false, report())),
+                                         settings_.threads);
     }
     bool spreads() const { return film().spreads(); }
     void save_checkpoint(const std::string& file) const {
@@ -373,7 +373,8 @@ struct Merged {
     /// Without the auxiliary images, which need the scene.
     Image denoised(const std::string& library) const {
         use_threads();
-        return Denoiser(library).denoise(image_with_layers(film(), {}, false, of->report(totals)));
+        return Denoiser(library).denoise(
+            to_image(image_rows(film(), {}, false, of->report(totals))));
     }
     bool spreads() const {
         return of->first().header().condition("filter mode") == to_string(FilterMode::Spread);
@@ -383,32 +384,35 @@ struct Merged {
     int height() const { return film().geometry().crop_height; }
 };
 
-/// A view of a film's sums, or of its sums of squares, which keeps its owner alive.
-template <class Owner>
-ReadOnlyDoubles sums_of(const Owner& owner, const Film& film, bool squares) {
-    const auto moments = film.moments();
+/// A part of the film's moments, by channel.
+template <class T>
+using PartOfMoments = T (PixelMoments::*)[3];
+template <class T>
+using ReadOnlyArray = nb::ndarray<nb::numpy, const T>;
+
+/// A view of them, which keeps its owner alive.
+template <class T, class Owner>
+ReadOnlyArray<T> view_of(const Owner& owner, const Film& film, PartOfMoments<T> part) {
     const size_t w = size_t(film.geometry().crop_width), h = size_t(film.geometry().crop_height);
-    const double* data = squares ? moments.front().square : moments.front().sum;
-    constexpr int64_t kStride = sizeof(Film::Moments) / sizeof(double);
-    return ReadOnlyDoubles(data, {h, w, 3}, nb::cast(owner), {int64_t(w) * kStride, kStride, 1});
+    constexpr int64_t kStride = sizeof(PixelMoments) / sizeof(T);
+    return ReadOnlyArray<T>(film.moments().front().*part, {h, w, 3}, nb::cast(owner),
+                            {int64_t(w) * kStride, kStride, 1});
 }
 
-/// The film's sums, or the sums of squares. After the rendering, a view that keeps it alive. The film of a running one
-/// changes when the callback has ended, so that callbacks get copies.
-ReadOnlyDoubles sums(const RenderingPtr& r, bool squares) {
+/// After the rendering, such a view. The film of a running one changes when the callback has ended, so that callbacks get
+/// copies.
+template <class T>
+ReadOnlyArray<T> view_or_copy(const RenderingPtr& r, PartOfMoments<T> part) {
+    if (!r->is_running()) return view_of(r, r->film(), part);
     const auto moments = r->film().moments();
-    const size_t w = size_t(r->width()), h = size_t(r->height());
-    if (r->is_running()) {
-        auto copy = std::make_unique<std::vector<double>>();
-        copy->reserve(3 * moments.size());
-        for (const Film::Moments& m : moments)
-            for (const double v : squares ? m.square : m.sum) copy->push_back(v);
-        const double* data = copy->data();
-        nb::capsule owner(copy.release(),
-                          [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
-        return ReadOnlyDoubles(data, {h, w, 3}, owner);
-    }
-    return sums_of(r, r->film(), squares);
+    auto copy = std::make_unique<std::vector<T>>();
+    copy->reserve(3 * moments.size());
+    for (const PixelMoments& m : moments)
+        for (const T v : m.*part) copy->push_back(v);
+    const T* data = copy->data();
+    nb::capsule owner(copy.release(),
+                      [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+    return ReadOnlyArray<T>(data, {size_t(r->height()), size_t(r->width()), 3}, owner);
 }
 
 /// An image of the film, which is computed without the GIL.
@@ -485,9 +489,14 @@ void bind_merging(nb::module_& m) {
              [](const Merged& r) { return image_of(r, [&] { return r.film().variance(); }); })
         .def("half_width",
              [](const Merged& r) { return image_of(r, [&] { return half_width_of(r.film()); }); })
-        .def("sums", [](const std::shared_ptr<Merged>& r) { return sums_of(r, r->film(), false); })
-        .def("squares",
-             [](const std::shared_ptr<Merged>& r) { return sums_of(r, r->film(), true); })
+        .def("sums",
+             [](const std::shared_ptr<Merged>& r) {
+                 return view_of(r, r->film(), &PixelMoments::sum);
+             })
+        .def("deviations",
+             [](const std::shared_ptr<Merged>& r) {
+                 return view_of(r, r->film(), &PixelMoments::deviation);
+             })
         .def("stats",
              [](const Merged& r) {
                  const nb::gil_scoped_release no_gil;
@@ -510,7 +519,7 @@ void bind_merging(nb::module_& m) {
             "save",
             [](const Merged& r, const std::string& file, const std::vector<std::string>&) {
                 check_image_extension(file);
-                write_image(file, image_with_layers(r.film(), {}, false, r.of->report(r.totals)));
+                write_image(file, image_rows(r.film(), {}, false, r.of->report(r.totals)));
             },
             nb::call_guard<nb::gil_scoped_release>(), "file"_a, "aovs"_a)
         .def("save_checkpoint", &Merged::save_checkpoint, nb::call_guard<nb::gil_scoped_release>(),
@@ -594,8 +603,9 @@ void bind_render(nb::module_& m) {
         .def(
             "half_width",
             [](const Rendering& r) { return image_of(r, [&] { return half_width_of(r.film()); }); })
-        .def("sums", [](const RenderingPtr& r) { return sums(r, false); })
-        .def("squares", [](const RenderingPtr& r) { return sums(r, true); })
+        .def("sums", [](const RenderingPtr& r) { return view_or_copy(r, &PixelMoments::sum); })
+        .def("deviations",
+             [](const RenderingPtr& r) { return view_or_copy(r, &PixelMoments::deviation); })
         .def("stats",
              [](const Rendering& r) {
                  const nb::gil_scoped_release no_gil;

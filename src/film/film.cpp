@@ -7,13 +7,16 @@
 namespace etendue {
 namespace {
 
-/// luminance(), but without the rounding to float, which would be a variance between equal passes.
-template <class T>
-double exact_luminance(const T& channels) {
-    constexpr double kRed = luminance({1, 0, 0}), kGreen = luminance({0, 1, 0}),
-                     kBlue = luminance({0, 0, 1});
-    return kRed * double(channels[0]) + kGreen * double(channels[1]) + kBlue * double(channels[2]);
-}
+/// The pixels of a process in a pass of any of the processes.
+struct ExchangedPass {
+    std::span<const Rgb> pixels;
+    uint64_t first;
+
+    void eye(uint64_t begin, std::span<Rgb> to) const {
+        std::copy_n(pixels.begin() + std::ptrdiff_t(begin - first), to.size(), to.begin());
+    }
+    void add_splats(uint64_t, std::span<Rgb>) const {}  // are in the pixels
+};
 
 }  // namespace
 
@@ -22,8 +25,7 @@ Film::Film(const FilmGeometry& geometry, const ReconstructionFilter& filter,
     : geometry_(geometry), filter_(filter),
       spreads_(mode == FilterMode::Spread && filter.is_wide()),
       grid_(geometry, filter, {0.5f, 0.5f}), pass_(geometry_, filter_, typical_radiance),
-      moments_(geometry.pixel_count()), expected_(geometry), previous_(geometry.pixel_count()),
-      luminance_squares_(geometry.pixel_count()) {
+      moments_(geometry.pixel_count()), expected_(geometry), previous_(geometry.pixel_count()) {
     set_ranks(kAlone);
 }
 
@@ -36,7 +38,9 @@ void Film::set_ranks(const Ranks& ranks) {
         chunk_begins_.push_back(chunks * r / count);
         pixel_begins_.push_back(std::min(pixels, chunk_begins_.back() * kFilmChunk));
     }
-    if (count > 1) exchanged_.resize(size_t(count * (own_end() - own_begin())));
+    if (count == 1) return;
+    finished_.resize(pixels);
+    exchanged_.resize(size_t(count * (own_end() - own_begin())));
 }
 
 void Film::begin_pass(uint64_t light_paths, Vec2 offset) {
@@ -62,7 +66,7 @@ void ExpectedLuminance::average_blocks() {
 }
 
 void Film::set_groups(int count) {
-    luminance_squares_ = std::vector<double>();
+    previous_ = std::vector<float>();
     group_sums_.assign(size_t(count), std::vector<float>(geometry_.pixel_count()));
     group_passes_.assign(size_t(count), 0);
 }
@@ -72,40 +76,36 @@ bool Film::has_all_groups() const {
 }
 
 void Film::end_pass(double splat_factor) {
-    const std::span<const Rgb> eye = pass_.finish_eye();
-    if (has_groups()) keep_luminance(eye);
-    fold(pass_.finish(), splat_factor);
+    pass_.finish();
+    fold(pass_, splat_factor);
     rejected_ += pass_.rejected();
     pass_.clear();
 }
 
 void Film::finish_pass() {
-    pass_.finish_eye();
     pass_.finish();
+    for_film_chunks(finished_.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
+        const std::span<Rgb> to(&finished_[begin], size_t(end - begin));
+        pass_.eye(begin, to);
+        pass_.add_splats(begin, to);
+    });
 }
 
 void Film::exchange(int passes) {
-    ranks_->distribute(pass_.pixels().data(), passes, sizeof(Rgb), pixel_begins_,
-                       exchanged_.data());
+    ranks_->distribute(finished_.data(), passes, sizeof(Rgb), pixel_begins_, exchanged_.data());
     pass_.clear();
 }
 
 void Film::add_pass(int rank, uint64_t rejected) {
     const size_t own = size_t(own_end() - own_begin());
-    fold(std::span(exchanged_).subspan(size_t(rank) * own, own), 1);
+    ExchangedPass pass{std::span(exchanged_).subspan(size_t(rank) * own, own), own_begin()};
+    fold(pass, 1);
     rejected_ += rejected;
 }
 
 void Film::complete() {
-    ranks_->share(moments_.data(), sizeof(Moments), pixel_begins_);
+    ranks_->share(moments_.data(), sizeof(PixelMoments), pixel_begins_);
     ranks_->share(previous_.data(), sizeof(float), pixel_begins_);
-    ranks_->share(luminance_squares_.data(), sizeof(double), pixel_begins_);
-}
-
-void Film::keep_luminance(std::span<const Rgb> eye) {
-    for_film_chunks(eye.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
-        for (uint64_t i = begin; i < end; ++i) previous_[i] = luminance(eye[i]);
-    });
 }
 
 template <class Body>
@@ -121,8 +121,9 @@ double Film::sum_of_chunks(std::vector<double>& sums) const {
     return sum;
 }
 
-void Film::fold(std::span<const Rgb> pass, double splat_factor) {
-    const uint64_t n = geometry_.pixel_count(), chunks = film_chunks(n), first = own_begin();
+template <class Pass>
+void Film::fold(Pass& pass, double splat_factor) {
+    const uint64_t n = geometry_.pixel_count(), chunks = film_chunks(n);
     const bool second = !has_groups() && passes_ % 2 == 1;
     const size_t g = has_groups() ? passes_ % group_sums_.size() : 0;
     float* const group = has_groups() ? group_sums_[g].data() : nullptr;
@@ -132,28 +133,30 @@ void Film::fold(std::span<const Rgb> pass, double splat_factor) {
     // throws, apart from the exchange with other processes, which end then.
     std::vector<double> luminance_sum(chunks), total(chunks), pair_sum(chunks), pass_sum(chunks);
     make_room(pass_means_), make_room(pair_errors_);
+    const double passes_before = double(passes_);
     ++passes_;
     if (group) ++group_passes_[g];
     const auto mean_of = [&](uint64_t i) { return moments_[i].luminance_sum() / float(passes_); };
     for_own_chunks([&](uint64_t chunk, uint64_t begin, uint64_t end) noexcept {
+        std::array<Rgb, kFilmChunk> values;
+        std::array<float, kFilmChunk> of_eye;  // luminance
+        const auto to = std::span(values).first(size_t(end - begin));
+        pass.eye(begin, to);
+        if (group)
+            for (size_t k = 0; k < to.size(); ++k) of_eye[k] = luminance(to[k]);
+        pass.add_splats(begin, to);
         for (uint64_t i = begin; i < end; ++i) {
-            const Rgb v = pass[i - first];
-            Moments& m = moments_[i];
-            for (int c = 0; c < 3; ++c) {
-                m.sum[c] += v[c];
-                m.square[c] += double(v[c]) * v[c];
-            }
+            const Rgb v = values[size_t(i - begin)];
+            moments_[i].add(v, passes_before);
             const float y = luminance(v);
             luminance_sum[chunk] += y;
             if (keeps_largest && y > largest_[i].luminance) largest_[i] = {y, index};
             if (second) total[chunk] += double(mean_of(i));
-            if (group) {
-                group[i] +=
-                    float((1 - splat_factor) * double(previous_[i]) + splat_factor * double(y));
-            } else {
+            if (group)
+                group[i] += float((1 - splat_factor) * double(of_eye[size_t(i - begin)]) +
+                                  splat_factor * double(y));
+            else
                 previous_[i] = second ? previous_[i] - y : y;
-                luminance_squares_[i] += sqr(exact_luminance(v));
-            }
         }
     });
     pass_means_.push_back(sum_of_chunks(luminance_sum) / double(n));
@@ -195,37 +198,38 @@ void Film::renew_expected() {
 
 std::vector<Rgb> Film::image() const {
     std::vector<Rgb> out(moments_.size());
-    const double inv = passes_ > 0 ? 1.0 / double(passes_) : 0.0;
-    for (size_t i = 0; i < out.size(); ++i)
-        for (int c = 0; c < 3; ++c) out[i][c] = float(moments_[i].sum[c] * inv);
+    image(0, out);
     return out;
+}
+
+void Film::image(uint64_t first, std::span<Rgb> to) const {
+    for (size_t k = 0; k < to.size(); ++k) to[k] = moments_[first + k].mean(double(passes_));
 }
 
 std::vector<Rgb> Film::variance() const {
     std::vector<Rgb> out(moments_.size());
-    if (has_groups()) {
-        if (!has_all_groups()) return out;
-        // Groups have only sums of luminance. All channels get the relative variance of the luminance.
-        const std::vector<Rgb> mean = image();
-        const size_t pairs = group_sums_.size() / 2;
-        for (size_t i = 0; i < out.size(); ++i) {
-            const double y = double(luminance(mean[i]));
+    variance(0, out);
+    return out;
+}
+
+void Film::variance(uint64_t first, std::span<Rgb> to) const {
+    const size_t pairs = group_sums_.size() / 2;
+    for (size_t k = 0; k < to.size(); ++k) {
+        const size_t i = size_t(first) + k;
+        to[k] = Rgb(0);
+        if (!has_groups()) {
+            to[k] = moments_[i].variance_of_mean(double(passes_));
+        } else if (has_all_groups()) {
+            // Groups have only sums of luminance. All channels get the relative variance of the luminance.
+            const Rgb mean = moments_[i].mean(double(passes_));
+            const double y = double(luminance(mean));
             if (!(y > 0)) continue;
             double error2 = 0;
             for (size_t pair = 0; pair < pairs; ++pair)
                 error2 += group_error2(pair, i) / double(pairs);
-            for (int c = 0; c < 3; ++c) out[i][c] = float(error2 * sqr(double(mean[i][c]) / y));
+            for (int c = 0; c < 3; ++c) to[k][c] = float(error2 * sqr(double(mean[c]) / y));
         }
-        return out;
     }
-    if (passes_ < 2) return out;
-    const double n = double(passes_);
-    for (size_t i = 0; i < out.size(); ++i)
-        for (int c = 0; c < 3; ++c) {
-            const double mean = moments_[i].sum[c] / n;
-            out[i][c] = float(std::max(0.0, moments_[i].square[c] / n - mean * mean) / (n - 1));
-        }
-    return out;
 }
 
 double Film::group_error2(size_t pair, size_t pixel) const {
@@ -292,8 +296,7 @@ size_t Film::noisy_pairs() const {
 double Film::error2_of_pass(uint64_t pixel, double mean) const {
     const double n = double(passes_), y = exact_luminance(moments_[pixel].sum) / n;
     const double scale2 = y * y + 0.01 * mean * mean;
-    const double variance = std::max(0.0, luminance_squares_[pixel] / n - y * y) * n / (n - 1);
-    return scale2 > 0 ? variance / scale2 : 0;
+    return scale2 > 0 ? sqr(double(moments_[pixel].luminance_deviation)) / (n - 1) / scale2 : 0;
 }
 
 void Film::renew_error2_of_pass() {

@@ -9,6 +9,7 @@
 #include "color/rgb.h"
 #include "film/expected_luminance.h"
 #include "film/pass_image.h"
+#include "film/pixel_moments.h"
 #include "system/ranks.h"
 
 namespace etendue {
@@ -42,10 +43,12 @@ public:
     Film(const Film&) = delete;
     Film& operator=(const Film&) = delete;
 
-    /// Memory of a film, by pixel, at most, without the samples of a grid's margin. `groups`: see set_groups().
-    static uint64_t bytes_per_pixel(bool has_splats, int groups) {
-        return sizeof(Moments) + 3 * sizeof(Rgb) + (2 + uint64_t(groups)) * sizeof(float) +
-               (groups > 0 ? 0 : sizeof(double)) + (has_splats ? 3 * sizeof(int64_t) : 0);
+    /// Memory of a film, by pixel, without the samples of a grid's margin. `groups`: see set_groups(). `has_ranks`: whether
+    /// several processes render the image.
+    static uint64_t bytes_per_pixel(bool has_splats, int groups, bool has_ranks = false) {
+        return sizeof(PixelMoments) + sizeof(Rgb) +
+               (1 + uint64_t(std::max(groups, 1))) * sizeof(float) +
+               (has_splats ? 3 * sizeof(int64_t) : 0) + (has_ranks ? 2 * sizeof(Rgb) : 0);
     }
 
     const FilmGeometry& geometry() const { return geometry_; }
@@ -134,8 +137,11 @@ public:
     }
     /// Mean of all passes.
     std::vector<Rgb> image() const;
+    /// The same of the pixels from `first` on, as many as `to` has.
+    void image(uint64_t first, std::span<Rgb> to) const;
     /// Variance of that mean, per pixel and channel; zero with fewer than two passes.
     std::vector<Rgb> variance() const;
+    void variance(uint64_t first, std::span<Rgb> to) const;
     /// Reads the sums of all groups if there are any; otherwise only one number for each pair of passes.
     ErrorEstimate error() const;
     bool has_groups() const { return !group_sums_.empty(); }
@@ -148,16 +154,8 @@ public:
     /// Contributions that were not finite and were left out.
     uint64_t rejected() const { return rejected_; }
 
-    /// Sums over the finished passes of a pixel's value, and of its square, by channel.
-    struct Moments {
-        double sum[3] = {0, 0, 0}, square[3] = {0, 0, 0};
-
-        float luminance_sum() const {
-            return luminance(Rgb(float(sum[0]), float(sum[1]), float(sum[2])));
-        }
-    };
     /// The sums of all pixels, row by row.
-    std::span<const Moments> moments() const { return moments_; }
+    std::span<const PixelMoments> moments() const { return moments_; }
     /// The brightest pass of every pixel since keep_largest(); empty if that was not called. Passes that were loaded or merged
     /// are not among them.
     std::span<const LargestPass> largest() const { return largest_; }
@@ -177,8 +175,6 @@ public:
 
 private:
     bool has_all_groups() const;
-    /// Stores the luminance of the eye paths' contributions in previous_.
-    void keep_luminance(std::span<const Rgb> eye);
     /// Squared error of the mean luminance of a pixel, estimated from the groups 2·pair and 2·pair + 1.
     double group_error2(size_t pair, size_t pixel) const;
     ErrorEstimate group_error() const;
@@ -189,8 +185,9 @@ private:
     /// Number of pairs of passes at the beginning whose errors are relative to a mean that was still noisy. They are left
     /// out when there are others, but not in a sum of films, where all may be like that: only their spread matters.
     size_t noisy_pairs() const;
-    /// Adds the pixels of this process, whose values are `pass`, to the totals.
-    void fold(std::span<const Rgb> pass, double splat_factor);
+    /// Adds the pixels of this process to the totals. A `Pass` has the functions eye() and add_splats() of PassImage.
+    template <class Pass>
+    void fold(Pass& pass, double splat_factor);
     /// Calls `body(chunk, begin, end)` for the chunks of the pixels of this process.
     template <class Body>
     void for_own_chunks(const Body& body) const;
@@ -204,10 +201,9 @@ private:
     bool spreads_;
     SampleGrid grid_;  ///< Of the current or last pass.
     PassImage pass_;
-    std::vector<Moments> moments_;
+    std::vector<PixelMoments> moments_;
     ExpectedLuminance expected_;
-    /// Luminance of the last pass with an even index; after the next pass, the difference of the two passes. With
-    /// groups: the luminance of the eye paths in the pass that is being added.
+    /// Luminance of the last pass with an even index; after the next pass, the difference of the two passes. Empty with groups.
     std::vector<float> previous_;
     /// Relative squared error of one pass, estimated from each pair of passes. The spread of these numbers gives the interval.
     /// Their mean would be too small: each is divided by the square of the image up to its pair, which is brighter where
@@ -220,15 +216,13 @@ private:
     std::vector<uint64_t> group_passes_;
     uint64_t passes_ = 0, rejected_ = 0;
     bool is_merged_ = false;  ///< Whether it is a sum of several films.
-    /// Sums of squared luminance, by pixel, for the error. Empty with groups.
-    std::vector<double> luminance_squares_;
     std::vector<LargestPass> largest_;
 
     const Ranks* ranks_ = &kAlone;
     /// The first chunk and the first pixel of each process, and their numbers.
     std::vector<uint64_t> chunk_begins_, pixel_begins_;
-    /// The pixels of this process in the passes of all; empty if it renders alone.
-    std::vector<Rgb> exchanged_;
+    /// The finished pass of this process, and its pixels in the passes of all; empty if it renders alone.
+    std::vector<Rgb> finished_, exchanged_;
 };
 
 template <class Use>

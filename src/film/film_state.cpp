@@ -30,7 +30,6 @@ void Film::save(SectionWriter& to) const {
     to.put(error2_of_pass_);
     to.put(group_passes_);
     for (const std::vector<float>& sums : group_sums_) to.put(sums);
-    to.put(luminance_squares_);
     // A sum of films needs nothing for later passes.
     if (is_merged_) return;
     to.put(expected_.pixels_);
@@ -61,7 +60,7 @@ void Film::load(SectionReader& from) {
     group_sums_.clear();
     for (size_t g = 0; g < group_passes_.size(); ++g)
         from.get(group_sums_.emplace_back(), pixels, "pixels of a group");
-    from.get(luminance_squares_, has_groups() ? 0 : pixels, "squares of pixels");
+    if (has_groups()) previous_ = std::vector<float>();
     if (!is_merged_) {
         from.get(expected_.pixels_, pixels, "pixels");
         expected_.blocks_.clear();
@@ -76,11 +75,7 @@ void Film::merge(const Film& other) {
         throw std::runtime_error("films of other sizes or groups of passes cannot be added");
     for_film_chunks(moments_.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
         for (uint64_t i = begin; i < end; ++i) {
-            for (int c = 0; c < 3; ++c) {
-                moments_[i].sum[c] += other.moments_[i].sum[c];
-                moments_[i].square[c] += other.moments_[i].square[c];
-            }
-            if (!has_groups()) luminance_squares_[i] += other.luminance_squares_[i];
+            moments_[i].merge(other.moments_[i], double(passes_), double(other.passes_));
             for (size_t g = 0; g < group_sums_.size(); ++g)
                 group_sums_[g][i] += other.group_sums_[g][i];
         }

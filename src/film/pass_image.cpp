@@ -1,9 +1,9 @@
 #include "film/pass_image.h"
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
-
-#include <tbb/enumerable_thread_specific.h>
 
 #include "film/parallel_chunks.h"
 #include "math/hash.h"
@@ -40,7 +40,7 @@ void PassImage::begin(uint64_t light_paths, const SampleGrid* grid) {
         splats_ = std::make_unique<SplatBuffer>(geometry_.pixel_count(), typical_radiance_);
     splat_scale_ = light_paths > 0 ? float(1.0 / double(light_paths)) : 0.0f;
     grid_ = grid;
-    if (grid_) samples_.resize(grid_->count());
+    samples_.resize(grid ? grid->count() : geometry_.pixel_count());
 }
 
 void PassImage::add_splat(Vec2 point, Rgb value) {
@@ -62,56 +62,62 @@ void PassImage::reject_if_not_finite(Rgb& value) {
     value = Rgb();
 }
 
-std::span<const Rgb> PassImage::finish_eye() {
-    std::vector<Rgb>& values = grid_ ? samples_ : pixels_;
-    for_film_chunks(values.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
-        for (uint64_t i = begin; i < end; ++i) reject_if_not_finite(values[i]);
+void PassImage::finish() {
+    for_film_chunks(samples_.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
+        for (uint64_t i = begin; i < end; ++i) reject_if_not_finite(samples_[i]);
     });
-    if (grid_) spread();
-    return pixels_;
 }
 
-void PassImage::spread() {
+void PassImage::eye(uint64_t begin, std::span<Rgb> to) const {
+    if (!grid_) {
+        std::copy_n(samples_.begin() + std::ptrdiff_t(begin), to.size(), to.begin());
+        return;
+    }
+    const auto width = size_t(geometry_.crop_width);
+    for (size_t done = 0; done < to.size();) {
+        const size_t pixel = size_t(begin) + done, column = pixel % width,
+                     count = std::min(to.size() - done, width - column);
+        convolve(int(pixel / width), int(column), to.subspan(done, count));
+        done += count;
+    }
+}
+
+void PassImage::convolve(int row, int column, std::span<Rgb> to) const {
     // All points have the same offset in their pixels, so all have the same weights: a separable convolution. Pixel
     // (i, j) has the weights in reverse order on the points (i, j) … (i + taps - 1, j + taps - 1) of the grid.
     const ReconstructionFilter::Taps x = filter_.taps(grid_->offset().x),
                                      y = filter_.taps(grid_->offset().y);
-    const auto columns = size_t(grid_->columns()), width = size_t(geometry_.crop_width);
-    tbb::enumerable_thread_specific<std::vector<Rgb>> lines;
-    tbb::parallel_for(0, geometry_.crop_height, [&](int j) {
-        std::vector<Rgb>& line = lines.local();
-        line.assign(columns, Rgb());
-        for (int k = 0; k < y.count; ++k) {
+    std::array<Rgb, kFilmChunk + ReconstructionFilter::kMostTaps> line;
+    for (size_t done = 0; done < to.size();) {
+        const size_t count = std::min<size_t>(to.size() - done, kFilmChunk),
+                     points = count + size_t(x.count) - 1;
+        const Rgb* from = &samples_[size_t(row) * size_t(grid_->columns()) + size_t(column) + done];
+        std::fill_n(line.begin(), points, Rgb());
+        for (int k = 0; k < y.count; ++k, from += grid_->columns()) {
             const float h = y.weight[size_t(y.count - 1 - k)];
-            const Rgb* row = &samples_[size_t(j + k) * columns];
-            for (size_t i = 0; i < columns; ++i) line[i] += row[i] * h;
+            for (size_t i = 0; i < points; ++i) line[i] += from[i] * h;
         }
-        Rgb* pixels = &pixels_[size_t(j) * width];
+        std::fill_n(to.begin() + std::ptrdiff_t(done), count, Rgb());
         for (int k = 0; k < x.count; ++k) {
             const float h = x.weight[size_t(x.count - 1 - k)];
-            for (size_t i = 0; i < width; ++i) pixels[i] += line[i + size_t(k)] * h;
+            for (size_t i = 0; i < count; ++i) to[done + i] += line[i + size_t(k)] * h;
         }
-    });
+        done += count;
+    }
 }
 
-std::span<const Rgb> PassImage::finish() {
-    if (!splats_) return pixels_;
-    splats_->fold_into(pixels_);
-    for_film_chunks(pixels_.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
-        for (uint64_t i = begin; i < end; ++i) reject_if_not_finite(pixels_[i]);
-    });
-    return pixels_;
+void PassImage::add_splats(uint64_t begin, std::span<Rgb> to) {
+    if (!splats_) return;
+    splats_->fold_into(begin, to);
+    for (Rgb& value : to) reject_if_not_finite(value);
 }
 
 void PassImage::clear() {
-    const auto clear = [](std::vector<Rgb>& values) {
-        for_film_chunks(values.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
-            std::fill(values.begin() + ptrdiff_t(begin), values.begin() + ptrdiff_t(end), Rgb());
-        });
-    };
     if (splats_) splats_->clear();
-    clear(samples_);
-    clear(pixels_);
+    for_film_chunks(samples_.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
+        std::fill(samples_.begin() + std::ptrdiff_t(begin), samples_.begin() + std::ptrdiff_t(end),
+                  Rgb());
+    });
     rejected_.store(0, std::memory_order_relaxed);
 }
 

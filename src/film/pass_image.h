@@ -29,25 +29,25 @@ public:
     PassImage(const FilmGeometry& geometry, const ReconstructionFilter& filter,
               double typical_radiance)
         : geometry_(geometry), filter_(filter), typical_radiance_(typical_radiance),
-          pixels_(geometry.pixel_count()) {}
+          samples_(geometry.pixel_count()) {}
 
     /// `light_paths`: number of light paths of the pass; 0 if there are none. `grid`: the film points of the eye paths,
     /// if their contributions are spread by the filter.
     void begin(uint64_t light_paths, const SampleGrid* grid);
     /// Adds to the sample `index`: a point of the grid, or else a pixel.
     void add_eye(uint64_t index, Rgb value) {
-        (grid_ ? samples_[grid_->place(index)] : pixels_[index]) += value;
+        samples_[grid_ ? grid_->place(index) : index] += value;
     }
     void add_splat(Vec2 point, Rgb value);
     void prefetch_splat(Vec2 point) const { splats_->prefetch(geometry_.pixel_at(point)); }
     bool has_splats() const { return splats_ != nullptr; }
 
-    /// The image of the eye paths alone. Values that are not finite become 0 and are counted as rejected.
-    std::span<const Rgb> finish_eye();
-    /// The finished image; after finish_eye().
-    std::span<const Rgb> finish();
-    /// The same, once it is finished.
-    std::span<const Rgb> pixels() const { return pixels_; }
+    /// Ends the pass. Eye paths whose values are not finite become black and are counted as rejected.
+    void finish();
+    /// Sets `to` to what the eye paths contribute to the pixels from `begin` on; after finish().
+    void eye(uint64_t begin, std::span<Rgb> to) const;
+    /// Adds the splats of these pixels, once each. Values that are not finite then become 0 and are counted as rejected.
+    void add_splats(uint64_t begin, std::span<Rgb> to);
     /// Number of values that were not finite and were left out.
     uint64_t rejected() const {
         return rejected_.load(std::memory_order_relaxed) + (splats_ ? splats_->rejected() : 0);
@@ -57,15 +57,14 @@ public:
 
 private:
     void reject_if_not_finite(Rgb& value);
-    /// Adds the samples to the pixels.
-    void spread();
+    /// Sets `to` to the pixels of a row of the crop from `column` on.
+    void convolve(int row, int column, std::span<Rgb> to) const;
 
     const FilmGeometry& geometry_;
     const ReconstructionFilter& filter_;
     double typical_radiance_;
     const SampleGrid* grid_ = nullptr;
-    std::vector<Rgb> samples_;  ///< Of the grid, row by row.
-    std::vector<Rgb> pixels_;
+    std::vector<Rgb> samples_;             ///< Of the grid, or else of the pixels, row by row.
     std::unique_ptr<SplatBuffer> splats_;  ///< Made by the first pass that has light paths.
     float splat_scale_ = 0;                ///< 1 / N_L
     std::atomic<uint64_t> rejected_{0};

@@ -85,21 +85,23 @@ double SplatBuffer::take(uint64_t cell, size_t digits) {
 }
 
 template <class To>
-void SplatBuffer::fold(std::span<To> sums) {
+void SplatBuffer::fold(uint64_t first, std::span<To> to) {
     size_t digits = kDigits;
     while (digits > 1 && !owned_[digits - 1]) --digits;
+    for (size_t k = 0; k < to.size(); ++k)
+        for (int c = 0; c < 3; ++c) {
+            const uint64_t cell = (first + k) * 3 + uint64_t(c);
+            const double units = digits == 1 ? double(empty(lowest_[cell])) : take(cell, digits);
+            add_to(to[k], c, units * unit_);
+        }
+}
+template void SplatBuffer::fold(uint64_t, std::span<Rgb>);
+
+void SplatBuffer::fold_into(std::span<Sum> sums) {
     for_film_chunks(sums.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
-        for (uint64_t i = begin; i < end; ++i)
-            for (int c = 0; c < 3; ++c) {
-                const uint64_t cell = i * 3 + uint64_t(c);
-                const double units =
-                    digits == 1 ? double(empty(lowest_[cell])) : take(cell, digits);
-                add_to(sums[i], c, units * unit_);
-            }
+        fold(begin, sums.subspan(begin, end - begin));
     });
 }
-template void SplatBuffer::fold(std::span<Rgb> sums);
-template void SplatBuffer::fold(std::span<Sum> sums);
 
 void SplatBuffer::clear() {
     const auto clear = [&](Cell* cells) {

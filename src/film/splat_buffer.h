@@ -38,11 +38,11 @@ public:
     /// Number of values that were left out since the buffer was made or cleared.
     uint64_t rejected() const { return rejected_.load(std::memory_order_relaxed); }
     void prefetch(uint64_t pixel) const { __builtin_prefetch(&lowest_[pixel * 3], 1); }
-    /// Adds every sum to `sums`, rounded once, and clears the buffer.
-    void fold_into(std::span<Rgb> sums) { fold(sums); }
-    /// The same with the sums of many passes.
+    /// Adds the sums of the pixels from `first` on to `to`, rounded once, and sets them to 0.
+    void fold_into(uint64_t first, std::span<Rgb> to) { fold(first, to); }
+    /// Adds every sum to the sums of many passes, in parallel, and clears the buffer.
     using Sum = std::array<double, 3>;
-    void fold_into(std::span<Sum> sums) { fold(sums); }
+    void fold_into(std::span<Sum> sums);
     void clear();
 
 private:
@@ -74,7 +74,7 @@ private:
     /// Returns the sum in units, rounded once, and sets the cell to 0.
     double take(uint64_t cell, size_t digits);
     template <class To>
-    void fold(std::span<To> sums);
+    void fold(uint64_t first, std::span<To> to);
 
     double unit_, units_per_radiance_;
     std::vector<Cell> lowest_;

@@ -18,6 +18,12 @@ std::string channel_name(std::string_view layer, std::string_view name) {
     return layer.empty() ? std::string(name) : fmt::format("{}.{}", layer, name);
 }
 
+/// -1 if there is none.
+int index_of(const std::vector<std::string>& channels, std::string_view name) {
+    const auto it = std::find(channels.begin(), channels.end(), name);
+    return it == channels.end() ? -1 : int(it - channels.begin());
+}
+
 }  // namespace
 
 Image::Image(int width, int height, std::vector<std::string> names)
@@ -25,8 +31,7 @@ Image::Image(int width, int height, std::vector<std::string> names)
       data(pixel_count() * channels.size()) {}
 
 int Image::channel(std::string_view name) const {
-    const auto it = std::find(channels.begin(), channels.end(), name);
-    return it == channels.end() ? -1 : int(it - channels.begin());
+    return index_of(channels, name);
 }
 
 std::vector<std::string> Image::layers() const {
@@ -37,32 +42,56 @@ std::vector<std::string> Image::layers() const {
     return found;
 }
 
+RgbChannels rgb_channels(const std::vector<std::string>& channels, std::string_view layer) {
+    const auto find = [&](std::string_view name) {
+        return index_of(channels, channel_name(layer, name));
+    };
+    const RgbChannels rgb{{find("R"), find("G"), find("B")}};
+    if (std::min({rgb.index[0], rgb.index[1], rgb.index[2]}) >= 0) return rgb;
+    int grey = find("Y");
+    const auto in_layer = [&](const std::string& c) { return layer_of(c) == layer; };
+    if (grey < 0 && std::count_if(channels.begin(), channels.end(), in_layer) == 1)
+        grey = int(std::find_if(channels.begin(), channels.end(), in_layer) - channels.begin());
+    if (grey < 0)
+        throw std::runtime_error(
+            fmt::format("the image has no channels R, G, B{} (it has: {})",
+                        layer.empty() ? "" : fmt::format(" in layer \"{}\"", layer),
+                        fmt::join(channels, ", ")));
+    return {{grey, grey, grey}};
+}
+
 std::vector<Rgb> rgb_pixels(const Image& image, std::string_view layer) {
-    int rgb[3];
-    for (int i = 0; i < 3; ++i)
-        rgb[i] = image.channel(channel_name(layer, std::string_view("RGB").substr(i, 1)));
-    if (rgb[0] < 0 || rgb[1] < 0 || rgb[2] < 0) {
-        int grey = image.channel(channel_name(layer, "Y"));
-        if (grey < 0) {
-            const auto in_layer = [&](const std::string& c) { return layer_of(c) == layer; };
-            if (std::count_if(image.channels.begin(), image.channels.end(), in_layer) == 1)
-                grey = int(std::find_if(image.channels.begin(), image.channels.end(), in_layer) -
-                           image.channels.begin());
-        }
-        if (grey < 0)
-            throw std::runtime_error(
-                fmt::format("the image has no channels R, G, B{} (it has: {})",
-                            layer.empty() ? "" : fmt::format(" in layer \"{}\"", layer),
-                            fmt::join(image.channels, ", ")));
-        std::fill(rgb, rgb + 3, grey);
-    }
+    const RgbChannels rgb = rgb_channels(image.channels, layer);
     std::vector<Rgb> pixels(image.pixel_count());
     const float* p = image.data.data();
     for (Rgb& pixel : pixels) {
-        pixel = {p[rgb[0]], p[rgb[1]], p[rgb[2]]};
+        pixel = rgb.of(p);
         p += image.channels.size();
     }
     return pixels;
+}
+
+ImageRows rows_of(const Image& image) {
+    if (image.data.size() != image.pixel_count() * image.channels.size())
+        throw std::invalid_argument("an image has another number of values than its size says");
+    return {image.width, image.height, image.channels, image.attributes,
+            [&image](int y, std::span<float> to) {
+                std::copy_n(image.data.begin() + std::ptrdiff_t(size_t(y) * to.size()), to.size(),
+                            to.begin());
+            }};
+}
+
+Image to_image(const ImageRows& rows) {
+    Image image(rows.width, rows.height, rows.channels);
+    image.attributes = rows.attributes;
+    const size_t size = size_t(rows.width) * rows.channels.size();
+    for (int y = 0; y < rows.height; ++y)
+        rows.make(y, std::span(image.data).subspan(size_t(y) * size, size));
+    return image;
+}
+
+void add_rgb_channels(std::string_view layer, std::vector<std::string>& channels) {
+    for (const char* name : {"R", "G", "B"}) channels.push_back(channel_name(layer, name));
 }
 
 void add_rgb_layer(Image& image, int width, int height, std::string_view layer,
@@ -78,13 +107,12 @@ void add_rgb_layer(Image& image, int width, int height, std::string_view layer,
         for (int c = 0; c < 3; ++c) to[c] = pixels[i][c];
     }
     image.data = std::move(data);
-    for (const char* name : {"R", "G", "B"}) image.channels.push_back(channel_name(layer, name));
+    add_rgb_channels(layer, image.channels);
 }
 
 Image layered_image(int width, int height, std::span<const RgbLayer> layers) {
     std::vector<std::string> channels;
-    for (const RgbLayer& l : layers)
-        for (const char* name : {"R", "G", "B"}) channels.push_back(channel_name(l.name, name));
+    for (const RgbLayer& l : layers) add_rgb_channels(l.name, channels);
     Image image(width, height, std::move(channels));
     for (size_t l = 0; l < layers.size(); ++l) {
         if (layers[l].pixels.size() != image.pixel_count())

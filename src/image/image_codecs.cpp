@@ -270,22 +270,56 @@ void append_bytes(png_structp png, png_bytep data, size_t size) {
     }
     if (!is_stored) png_error(png, "not enough memory");
 }
+/// Errors stay in the file until its commit().
+void write_bytes(png_structp png, png_bytep data, size_t size) {
+    static_cast<OutputFile*>(png_get_io_ptr(png))->write(data, size);
+}
 void flush_nothing(png_structp) {}
 
-bool encode_rows(png_structp png, png_infop info, Escape& escape, std::string& bytes, int width,
-                 int height, int channels, const uint8_t* codes) {
-    if (setjmp(escape.place)) return false;
-    png_set_write_fn(png, &bytes, append_bytes, flush_nothing);
-    png_set_IHDR(png, info, png_uint_32(width), png_uint_32(height), 8,
-                 channels == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
-                 PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-    png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
-    png_write_info(png, info);
-    for (int y = 0; y < height; ++y)
-        png_write_row(png, codes + size_t(y) * size_t(width * channels));
-    png_write_end(png, nullptr);
-    return true;
-}
+/// A PNG file of 8-bit sRGB codes, row by row. `write` gets its bytes, and `target` by png_get_io_ptr().
+class PngWriter {
+public:
+    PngWriter(png_rw_ptr write, void* target, int width, int height, int channels) {
+        if (!begin(write, target, width, height, channels)) fail();
+    }
+    PngWriter(const PngWriter&) = delete;
+    PngWriter& operator=(const PngWriter&) = delete;
+    ~PngWriter() { png_destroy_write_struct(&png_, &info_); }
+
+    void add_row(const uint8_t* codes) {
+        if (!try_to([&] { png_write_row(png_, codes); })) fail();
+    }
+    void end() {
+        if (!try_to([&] { png_write_end(png_, nullptr); })) fail();
+    }
+
+private:
+    bool begin(png_rw_ptr write, void* target, int width, int height, int channels) {
+        return try_to([&] {
+            png_set_write_fn(png_, target, write, flush_nothing);
+            png_set_IHDR(png_, info_, png_uint_32(width), png_uint_32(height), 8,
+                         channels == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB,
+                         PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+            png_set_sRGB(png_, info_, PNG_sRGB_INTENT_PERCEPTUAL);
+            png_write_info(png_, info_);
+        });
+    }
+    /// `call` must make no object with a destructor. Returns false after an error.
+    template <class Call>
+    bool try_to(const Call& call) {
+        if (setjmp(escape_.place)) return false;
+        call();
+        return true;
+    }
+    [[noreturn]] void fail() const {
+        throw std::runtime_error(fmt::format("cannot encode a PNG: {}", escape_.message));
+    }
+
+    Escape escape_;
+    png_structp png_ =
+        png_create_write_struct(PNG_LIBPNG_VER_STRING, &escape_, png_fails, png_warns);
+    png_infop info_ = png_create_info_struct(png_);
+};
 
 // ------------------------------------------------------------------------------------------------------- JPEG
 
@@ -520,18 +554,22 @@ PixelBuffer decode_pixels(const std::string& bytes, const std::string& name, boo
 std::string encode_png(int width, int height, std::span<const uint8_t> codes) {
     const int channels = png_channels(width, height, codes.size());
     std::string bytes;
-    Escape escape;
-    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &escape, png_fails, png_warns);
-    png_infop info = png_create_info_struct(png);
-    const bool is_good =
-        encode_rows(png, info, escape, bytes, width, height, channels, codes.data());
-    png_destroy_write_struct(&png, &info);
-    if (!is_good) throw std::runtime_error(fmt::format("cannot encode a PNG: {}", escape.message));
+    PngWriter png(append_bytes, &bytes, width, height, channels);
+    for (int y = 0; y < height; ++y) png.add_row(&codes[size_t(y) * size_t(width * channels)]);
+    png.end();
     return bytes;
 }
 
-void write_exr(OutputFile& file, const Image& image, ExrPrecision precision) {
+void write_png(OutputFile& file, const ImageRows& image, ExrPrecision) {
+    PngWriter png(write_bytes, &file, image.width, image.height, 3);
+    for_each_rgb_row(image,
+                     [&](int, std::span<const Rgb> row) { png.add_row(srgb_codes(row).data()); });
+    png.end();
+}
+
+void write_exr(OutputFile& file, const ImageRows& image, ExrPrecision precision) {
     constexpr float kMaxHalf = 65504;
+    constexpr int kRows = 16;  // which ZIP_COMPRESSION compresses together
     const bool is_half = precision == ExrPrecision::Half;
     Imf::Header header(image.width, image.height);
     header.compression() = Imf::ZIP_COMPRESSION;
@@ -543,24 +581,32 @@ void write_exr(OutputFile& file, const Image& image, ExrPrecision precision) {
         else
             header.insert(name, Imf::DoubleAttribute(std::get<double>(value)));
     }
-    std::vector<Half> halves;
-    if (is_half)
-        for (const float v : image.data)
-            halves.emplace_back(std::isfinite(v) ? std::clamp(v, -kMaxHalf, kMaxHalf) : v);
+    const size_t row = size_t(image.width) * image.channels.size();
+    std::vector<float> values(row * kRows);
+    std::vector<Half> halves(is_half ? values.size() : 0);
     const size_t size = is_half ? sizeof(Half) : sizeof(float);
-    const size_t pixel = size * image.channels.size();
-    char* base = is_half ? reinterpret_cast<char*>(halves.data())
-                         : reinterpret_cast<char*>(const_cast<float*>(image.data.data()));
+    char* const base =
+        is_half ? reinterpret_cast<char*>(halves.data()) : reinterpret_cast<char*>(values.data());
     try {
         ExrOutput target(file);
         Imf::OutputFile out(target, header);
-        Imf::FrameBuffer buffer;
-        for (size_t i = 0; i < image.channels.size(); ++i)
-            buffer.insert(image.channels[i],
-                          Imf::Slice(is_half ? Imf::HALF : Imf::FLOAT, base + i * size, pixel,
-                                     pixel * size_t(image.width)));
-        out.setFrameBuffer(buffer);
-        out.writePixels(image.height);
+        for (int begin = 0; begin < image.height; begin += kRows) {
+            const int end = std::min(begin + kRows, image.height);
+            for (int y = begin; y < end; ++y)
+                image.make(y, std::span(values).subspan(size_t(y - begin) * row, row));
+            for (size_t i = 0; i < halves.size(); ++i)
+                halves[i] = std::isfinite(values[i]) ? std::clamp(values[i], -kMaxHalf, kMaxHalf)
+                                                     : values[i];
+            Imf::FrameBuffer buffer;
+            for (size_t c = 0; c < image.channels.size(); ++c)
+                // OpenEXR counts rows from that of the image.
+                buffer.insert(image.channels[c],
+                              Imf::Slice(is_half ? Imf::HALF : Imf::FLOAT,
+                                         base + c * size - size_t(begin) * row * size,
+                                         size * image.channels.size(), row * size));
+            out.setFrameBuffer(buffer);
+            out.writePixels(end - begin);
+        }
     } catch (const Iex::BaseExc& e) {
         file.fail(e.what());
     }

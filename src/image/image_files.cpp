@@ -21,26 +21,21 @@ namespace fs = std::filesystem;
     throw std::runtime_error(fmt::format("cannot write \"{}\": {}", path, why));
 }
 
-std::vector<Rgb> colours(const OutputFile& file, const Image& image) {
-    try {
-        return rgb_pixels(image);
-    } catch (const std::runtime_error& e) {
-        file.fail(e.what());
-    }
-}
-
 // Portable float map: rows from the bottom, little-endian where the scale is negative.
-void write_pfm(OutputFile& file, const Image& image, ExrPrecision) {
+void write_pfm(OutputFile& file, const ImageRows& image, ExrPrecision) {
     static_assert(std::endian::native == std::endian::little);
-    const bool grey = image.channels.size() == 1;
-    const std::vector<Rgb> pixels = colours(file, image);
-    file.write(fmt::format("{}\n{} {}\n-1.0\n", grey ? "Pf" : "PF", image.width, image.height));
-    std::vector<float> row;
+    const bool is_grey = image.channels.size() == 1;
+    const RgbChannels rgb = rgb_channels(image.channels);
+    file.write(fmt::format("{}\n{} {}\n-1.0\n", is_grey ? "Pf" : "PF", image.width, image.height));
+    const size_t channels = image.channels.size();
+    std::vector<float> values(size_t(image.width) * channels), row;
     for (int y = image.height - 1; y >= 0; --y) {
+        image.make(y, values);
         row.clear();
-        for (int x = 0; x < image.width; ++x)
-            for (int c = 0; c < (grey ? 1 : 3); ++c)
-                row.push_back(pixels[size_t(y) * image.width + x][c]);
+        for (size_t x = 0; x < size_t(image.width); ++x) {
+            const Rgb c = rgb.of(&values[x * channels]);
+            for (int i = 0; i < (is_grey ? 1 : 3); ++i) row.push_back(c[i]);
+        }
         file.write(row.data(), row.size() * sizeof(float));
     }
 }
@@ -58,8 +53,7 @@ void to_rgbe(const Rgb& c, uint8_t* code) {
     code[3] = uint8_t(exponent + 128);
 }
 
-void write_hdr(OutputFile& file, const Image& image, ExrPrecision) {
-    const std::vector<Rgb> pixels = colours(file, image);
+void write_hdr(OutputFile& file, const ImageRows& image, ExrPrecision) {
     const size_t width = size_t(image.width);
     file.write(fmt::format("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {} +X {}\n", image.height,
                            image.width));
@@ -67,8 +61,8 @@ void write_hdr(OutputFile& file, const Image& image, ExrPrecision) {
     const bool has_runs = width >= 8 && width < 32768;
     std::vector<uint8_t> row(4 * width);
     std::string bytes;
-    for (size_t y = 0; y < size_t(image.height); ++y) {
-        for (size_t x = 0; x < width; ++x) to_rgbe(pixels[y * width + x], &row[4 * x]);
+    for_each_rgb_row(image, [&](int, std::span<const Rgb> colours) {
+        for (size_t x = 0; x < width; ++x) to_rgbe(colours[x], &row[4 * x]);
         bytes.clear();
         if (has_runs) {
             for (const size_t b : {size_t(2), size_t(2), width >> 8, width & 255}) bytes += char(b);
@@ -82,23 +76,22 @@ void write_hdr(OutputFile& file, const Image& image, ExrPrecision) {
             bytes.assign(row.begin(), row.end());
         }
         file.write(bytes);
-    }
+    });
 }
 
 uint8_t srgb_code(float v) {
     return uint8_t(linear_to_srgb(std::clamp(v, 0.0f, 1.0f)) * 255 + 0.5f);
 }
 
-void write_srgb(OutputFile& file, const Image& image, ExrPrecision) {
-    file.write(encode_png(image.width, image.height, srgb_codes(colours(file, image))));
-}
-
 struct Writer {
     const char* extension;
-    void (*write)(OutputFile& file, const Image& image, ExrPrecision precision);
+    bool stores_all_channels;
+    void (*write)(OutputFile& file, const ImageRows& image, ExrPrecision precision);
 };
-constexpr Writer kWriters[] = {
-    {".exr", write_exr}, {".pfm", write_pfm}, {".hdr", write_hdr}, {".png", write_srgb}};
+constexpr Writer kWriters[] = {{".exr", true, write_exr},
+                               {".pfm", false, write_pfm},
+                               {".hdr", false, write_hdr},
+                               {".png", false, write_png}};
 
 const Writer& writer_for(const std::string& path) {
     const std::string e = image_extension(path);
@@ -159,11 +152,16 @@ void check_image_extension(const std::string& path) {
     writer_for(path);
 }
 
-void write_image(const std::string& path, const Image& image, ExrPrecision precision, Links links) {
+void write_image(const std::string& path, const ImageRows& image, ExrPrecision precision,
+                 Links links) {
     const Writer& writer = writer_for(path);
-    if (image.pixel_count() == 0 ||
-        image.data.size() != image.pixel_count() * image.channels.size())
+    if (image.width < 1 || image.height < 1 || image.channels.empty())
         fail_write(path, "the image is empty");
+    if (!writer.stores_all_channels) try {
+            rgb_channels(image.channels);
+        } catch (const std::runtime_error& e) {
+            fail_write(path, e.what());
+        }
     OutputFile file(path, links);
     writer.write(file, image, precision);
     file.commit();

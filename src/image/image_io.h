@@ -36,8 +36,12 @@ enum class ExrPrecision { Float, Half };
 /// Writes the format given by the name's extension: .exr stores all channels and attributes; .pfm, .hdr and .png (sRGB,
 /// clamped, NaN as magenta) store the colours of the unnamed layer. The file is an OutputFile. With ExrPrecision::Half
 /// finite values are clamped to the range of half floats.
-void write_image(const std::string& path, const Image& image,
+void write_image(const std::string& path, const ImageRows& image,
                  ExrPrecision precision = ExrPrecision::Float, Links links = Links::Follow);
+inline void write_image(const std::string& path, const Image& image,
+                        ExrPrecision precision = ExrPrecision::Float, Links links = Links::Follow) {
+    write_image(path, rows_of(image), precision, links);
+}
 
 /// The 8-bit sRGB codes that write_image() stores in a .png: colours are clamped, NaN is magenta.
 std::vector<uint8_t> srgb_codes(std::span<const Rgb> pixels);

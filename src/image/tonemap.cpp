@@ -46,23 +46,35 @@ double inverse_aces_curve(double y) {
     return (-q - std::sqrt(q * q - 4 * p * r)) / (2 * p) / kAcesScale;
 }
 
+std::vector<float> finite_luminances(std::span<const Rgb> pixels) {
+    std::vector<float> values;
+    for (const Rgb c : pixels)
+        if (is_finite(c)) values.push_back(luminance(c));
+    return values;
+}
+
+ToneCurve::ToneCurve(const ToneMapping& mapping, float largest)
+    : op_(mapping.op),
+      // Zero times infinity would be no colour.
+      scale_(std::exp2(std::clamp(mapping.exposure, -126.0f, 127.0f))), white_(mapping.white) {
+    if (white_ > 0) return;
+    white_ = std::max(0.0, double(largest) * double(scale_));
+    if (white_ == 0) white_ = 1;  // black stays black
+}
+
+Rgb ToneCurve::operator()(Rgb c) const {
+    c *= scale_;
+    if (op_ == ToneOperator::Reinhard) c = reinhard(c, white_);
+    if (op_ == ToneOperator::Aces) c = {aces_curve(c.r), aces_curve(c.g), aces_curve(c.b)};
+    return clamp01(c);
+}
+
 std::vector<Rgb> tone_map(std::span<const Rgb> pixels, const ToneMapping& mapping) {
+    const std::vector<float> values = finite_luminances(pixels);
+    const ToneCurve curve(mapping,
+                          values.empty() ? 0 : *std::max_element(values.begin(), values.end()));
     std::vector<Rgb> mapped(pixels.begin(), pixels.end());
-    // Zero times infinity would be no colour.
-    const float scale = std::exp2(std::clamp(mapping.exposure, -126.0f, 127.0f));
-    double white = mapping.white;
-    if (mapping.op == ToneOperator::Reinhard && white <= 0) {
-        for (const Rgb c : mapped)
-            if (is_finite(c)) white = std::max(white, double(luminance(c)) * scale);
-        if (white == 0) white = 1;  // black stays black
-    }
-    for (Rgb& c : mapped) {
-        c *= scale;
-        if (mapping.op == ToneOperator::Reinhard) c = reinhard(c, white);
-        if (mapping.op == ToneOperator::Aces)
-            c = {aces_curve(c.r), aces_curve(c.g), aces_curve(c.b)};
-        c = clamp01(c);
-    }
+    for (Rgb& c : mapped) c = curve(c);
     return mapped;
 }
 
@@ -82,10 +94,7 @@ Rgb magma(float v) {
     return {channel(16), channel(8), channel(0)};
 }
 
-float auto_exposure(std::span<const Rgb> pixels) {
-    std::vector<float> values;
-    for (Rgb c : pixels)
-        if (is_finite(c)) values.push_back(luminance(c));
+float auto_exposure(std::vector<float> values) {
     if (values.empty()) return 0;
     const auto high = values.begin() + std::ptrdiff_t(0.95 * double(values.size() - 1));
     std::nth_element(values.begin(), high, values.end());

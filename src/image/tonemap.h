@@ -23,11 +23,28 @@ struct ToneMapping {
     /// Luminance, after exposure, that Reinhard maps to white; 0: the largest in the image.
     float white = 0;
 };
-/// Linear colours in [0, 1]; NaN stays NaN.
+/// Luminances of the colours that are finite.
+std::vector<float> finite_luminances(std::span<const Rgb> pixels);
+
+/// A mapping of the colours of one image to linear colours in [0, 1]; NaN stays NaN.
+class ToneCurve {
+public:
+    /// `largest`: the largest finite luminance of the image, for ToneMapping::white.
+    ToneCurve(const ToneMapping& mapping, float largest);
+    Rgb operator()(Rgb c) const;
+
+private:
+    ToneOperator op_;
+    float scale_;
+    double white_;
+};
 std::vector<Rgb> tone_map(std::span<const Rgb> pixels, const ToneMapping& mapping);
 
 /// Exposure, in stops, that maps the 95th percentile of the luminance to 0.8; a multiple of 1/4. 0 for black images.
-float auto_exposure(std::span<const Rgb> pixels);
+float auto_exposure(std::vector<float> luminances);
+inline float auto_exposure(std::span<const Rgb> pixels) {
+    return auto_exposure(finite_luminances(pixels));
+}
 
 /// The rational function of [Narkowicz 2016] at 0.6 x, the scale he recommends; clamped to [0, 1].
 float aces_curve(float x);

@@ -107,7 +107,7 @@ CheckpointHeader load_header(SectionReader& from) {
         from.fail("the ranges of passes cannot be");
     // What is read later is no larger than the file, and what is allocated before, not much larger.
     const uint64_t bytes = from.size("film");
-    if (g.pixel_count() > bytes / sizeof(Film::Moments) || h.passes() > bytes / sizeof(double))
+    if (g.pixel_count() > bytes / sizeof(PixelMoments) || h.passes() > bytes / sizeof(double))
         from.fail("section \"film\" is too short for the image");
     return h;
 }

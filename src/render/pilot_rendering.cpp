@@ -15,7 +15,7 @@ namespace {
 std::vector<float> grey(const Film& film) {
     std::vector<float> values;
     values.reserve(film.moments().size());
-    for (const Film::Moments& m : film.moments())
+    for (const PixelMoments& m : film.moments())
         values.push_back(float((m.sum[0] + m.sum[1] + m.sum[2]) / 3));
     return values;
 }

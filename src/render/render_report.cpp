@@ -71,33 +71,46 @@ nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettin
     return j;
 }
 
-void add_attributes(const nlohmann::json& report, Image& image) {
+ImageAttributes attributes_of(const nlohmann::json& report) {
+    ImageAttributes attributes;
     for (const auto& [key, value] : report.items())
         if (value.is_string())
-            image.attributes["etendue." + key] = value.get<std::string>();
+            attributes["etendue." + key] = value.get<std::string>();
         else if (value.is_number_unsigned() && value.get<uint64_t>() >> 53 != 0)
-            image.attributes["etendue." + key] = value.dump();
+            attributes["etendue." + key] = value.dump();
         else if (value.is_number())
-            image.attributes["etendue." + key] = value.get<double>();
-    image.attributes["etendue.version"] = std::string(ETENDUE_VERSION);
+            attributes["etendue." + key] = value.get<double>();
+    attributes["etendue.version"] = std::string(ETENDUE_VERSION);
+    return attributes;
 }
 
-Image image_with_layers(const Film& film, const std::vector<AovImage>& layers, bool has_variance,
-                        const nlohmann::json& report) {
-    const std::vector<Rgb> pixels = film.image();
-    const std::vector<Rgb> variance = has_variance ? film.variance() : std::vector<Rgb>();
-    std::vector<RgbLayer> all{{"", pixels}};
-    for (const AovImage& a : layers) all.push_back({a.name, a.pixels});
-    if (has_variance) all.push_back({"variance", variance});
-    Image image = layered_image(film.geometry().crop_width, film.geometry().crop_height, all);
-    add_attributes(report, image);
-    return image;
-}
-
-Image image_with_layers(const Renderer& renderer, const Scene& scene, uint64_t seed, int threads,
-                        const std::vector<std::string>& aovs, const nlohmann::json& report) {
-    return image_with_layers(renderer.film(), render_aovs(scene, aovs, kAovSamples, seed, threads),
-                             std::find(aovs.begin(), aovs.end(), "variance") != aovs.end(), report);
+ImageRows image_rows(const Film& film, std::span<const AovImage> layers, bool has_variance,
+                     const nlohmann::json& report) {
+    std::vector<std::string> names{""};
+    for (const AovImage& layer : layers) names.push_back(layer.name);
+    if (has_variance) names.push_back("variance");
+    const FilmGeometry& g = film.geometry();
+    ImageRows rows{g.crop_width, g.crop_height, {}, attributes_of(report), {}};
+    for (const std::string& name : names) add_rgb_channels(name, rows.channels);
+    rows.make = [&film, layers, has_variance](int y, std::span<float> to) {
+        const auto width = size_t(film.geometry().crop_width);
+        const uint64_t first = uint64_t(y) * width;
+        const size_t channels = to.size() / width;
+        size_t at = 0;
+        const auto add = [&](std::span<const Rgb> pixels) {
+            for (size_t x = 0; x < width; ++x)
+                for (int c = 0; c < 3; ++c) to[x * channels + at + size_t(c)] = pixels[x][c];
+            at += 3;
+        };
+        std::vector<Rgb> row(width);
+        film.image(first, row);
+        add(row);
+        for (const AovImage& layer : layers) add(std::span(layer.pixels).subspan(first, width));
+        if (!has_variance) return;
+        film.variance(first, row);
+        add(row);
+    };
+    return rows;
 }
 
 }  // namespace etendue

@@ -47,14 +47,11 @@ nlohmann::json to_json(const Renderer& r, const Scene& scene, const RenderSettin
                        const std::string& stopped_by, const PassLog& log,
                        const ErrorEstimate* error = nullptr);
 
-/// Sets the texts and numbers of a report as metadata, with the version of the program.
-void add_attributes(const nlohmann::json& report, Image& image);
-/// The image with `layers`, with a layer of its variance if `has_variance`, and with the texts and numbers of `report` as
-/// metadata.
-Image image_with_layers(const Film& film, const std::vector<AovImage>& layers, bool has_variance,
-                        const nlohmann::json& report);
-/// The same with the layers of aov_registry() that `aovs` names, which are rendered here.
-Image image_with_layers(const Renderer& renderer, const Scene& scene, uint64_t seed, int threads,
-                        const std::vector<std::string>& aovs, const nlohmann::json& report);
+/// The texts and numbers of a report, with the version of the program.
+ImageAttributes attributes_of(const nlohmann::json& report);
+/// The image with `layers`, with a layer of its variance if `has_variance`, and with attributes_of(report). It reads the
+/// film and the layers when it is written.
+ImageRows image_rows(const Film& film, std::span<const AovImage> layers, bool has_variance,
+                     const nlohmann::json& report);
 
 }  // namespace etendue

@@ -217,16 +217,15 @@ void check_ranks(const RenderSettings& settings, const Integrator& integrator) {
             "contributions cannot be observed where several processes render together");
 }
 
-/// The film's geometry, if there is memory for its film and for the image that is written.
+/// The film's geometry, if there is memory for its film.
 const FilmGeometry& fitting_film(const Scene& scene, const RenderSettings& settings,
                                  const Integrator& integrator, uint64_t light_paths) {
     const FilmGeometry& g = scene.film();
     uint64_t bytes =
-        g.pixel_count() * Film::bytes_per_pixel(light_paths > 0, integrator.error_groups()) +
-        g.pixel_count() * sizeof(Rgb);
+        g.pixel_count() * Film::bytes_per_pixel(light_paths > 0, integrator.error_groups(),
+                                                settings.ranks->count() > 1);
     if (settings.keeps_largest && integrator.error_groups() == 0)
         bytes += g.pixel_count() * sizeof(LargestPass);
-    if (settings.ranks->count() > 1) bytes += g.pixel_count() * sizeof(Rgb);
     if (settings.technique_depth > 0)
         bytes += TechniqueImages::memory_bytes(g.pixel_count(), settings.technique_depth);
     require_memory(bytes, fmt::format("an image of {} x {} pixels", g.crop_width, g.crop_height),

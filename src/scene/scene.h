@@ -14,7 +14,7 @@
 #include "bsdf/material.h"
 #include "description/scene_description.h"
 #include "emitter/emitter.h"
-#include "film/film.h"
+#include "film/film_geometry.h"
 #include "geometry/accelerator.h"
 #include "math/distribution.h"
 #include "sensor/sensor.h"

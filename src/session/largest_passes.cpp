@@ -9,7 +9,7 @@ namespace etendue {
 SumsBefore SumsBefore::of(const Film& film) {
     SumsBefore before{.passes = film.passes(), .luminance = {}};
     before.luminance.reserve(film.moments().size());
-    for (const Film::Moments& m : film.moments()) before.luminance.push_back(m.luminance_sum());
+    for (const PixelMoments& m : film.moments()) before.luminance.push_back(m.luminance_sum());
     return before;
 }
 

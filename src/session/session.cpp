@@ -414,7 +414,7 @@ void Session::fill(Run& run, Snapshot& snapshot) {
     if (run.seeds.count() > 0)
         run.seeds.fill(film, snapshot);
     else
-        fill_snapshot(*film, film->has_groups(), snapshot);
+        fill_snapshot(*film, snapshot);
     snapshot.report = nullptr;
     if (!run.renderer && !run.totals) return;
     // Lists, such as the times of passes, are not stored in images.

@@ -14,29 +14,6 @@
 #include "render/render_report.h"
 
 namespace etendue {
-namespace {
-
-/// Mean and variance of `n` images of one channel from its sums.
-struct Estimate {
-    double mean, variance;
-};
-Estimate estimate(const Film::Moments& m, int channel, double n) {
-    if (!(n > 0)) return {0, 0};
-    const double inv = 1 / n, mean = m.sum[channel] * inv;  // the same bits as Film::image()
-    if (n < 2) return {mean, 0};
-    return {mean, std::max(0.0, m.square[channel] * inv - mean * mean) / (n - 1)};
-}
-
-/// Calls use(pixel, channel) for all, in parallel.
-template <class Use>
-void for_each_channel(uint64_t pixels, const Use& use) {
-    for_film_chunks(pixels, [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
-        for (uint64_t i = begin; i < end; ++i)
-            for (int c = 0; c < 3; ++c) use(i, c);
-    });
-}
-
-}  // namespace
 
 double interval_half_width(double variance, uint64_t passes) {
     return student_quantile(0.05, double(passes - 1)) * std::sqrt(variance);
@@ -51,7 +28,7 @@ void save(const Snapshot& snapshot, const std::string& file, bool replaces) {
         if (!replaces) throw std::runtime_error(fmt::format("{}: exists already", file));
     }
     Image image = rgb_image(snapshot.width, snapshot.height, snapshot.mean);
-    if (snapshot.report) add_attributes(*snapshot.report, image);
+    if (snapshot.report) image.attributes = attributes_of(*snapshot.report);
     write_image(file, image, ExrPrecision::Float, Links::Replace);
 }
 
@@ -71,27 +48,20 @@ std::shared_ptr<Snapshot> SnapshotPool::take() {
             }};
 }
 
-void fill_snapshot(const Film& film, bool has_groups, Snapshot& to) {
+void fill_snapshot(const Film& film, Snapshot& to) {
+    const uint64_t pixels = film.moments().size();
     to.passes = film.passes();
-    const std::span<const Film::Moments> moments = film.moments();
-    to.mean.resize(moments.size());
-    if (has_groups)
-        to.variance = film.variance();
-    else
-        to.variance.resize(moments.size());
-    for_each_channel(moments.size(), [&](uint64_t i, int c) {
-        const Estimate e = estimate(moments[i], c, double(film.passes()));
-        to.mean[i][c] = float(e.mean);
-        if (!has_groups) to.variance[i][c] = float(e.variance);
+    to.mean.resize(pixels), to.variance.resize(pixels);
+    for_film_chunks(pixels, [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
+        film.image(begin, std::span(to.mean).subspan(begin, end - begin));
+        film.variance(begin, std::span(to.variance).subspan(begin, end - begin));
     });
 }
 
 void SeedMean::add(std::span<const Rgb> image, uint64_t passes) {
     moments_.resize(image.size());
-    for_each_channel(image.size(), [&](uint64_t i, int c) {
-        const double value = image[i][c];
-        moments_[i].sum[c] += value;
-        moments_[i].square[c] += value * value;
+    for_film_chunks(image.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
+        for (uint64_t i = begin; i < end; ++i) moments_[i].add(image[i], double(count_));
     });
     passes_ += passes;
     ++count_;
@@ -103,15 +73,15 @@ void SeedMean::fill(const Film* film, Snapshot& to) const {
     to.mean.resize(moments_.size());
     to.variance.resize(moments_.size());
     // A rendering under way counts by its passes.
-    const double share = double(more) / double(to.passes);
-    for_each_channel(moments_.size(), [&](uint64_t i, int c) {
-        const Estimate e = estimate(moments_[i], c, count_);
-        const double mean =
-            more > 0
-                ? (1 - share) * e.mean + share * estimate(film->moments()[i], c, double(more)).mean
-                : e.mean;
-        to.mean[i][c] = float(mean);
-        to.variance[i][c] = float(e.variance);
+    const float share = float(double(more) / double(to.passes));
+    for_film_chunks(moments_.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
+        for (uint64_t i = begin; i < end; ++i) {
+            to.mean[i] = moments_[i].mean(double(count_));
+            to.variance[i] = moments_[i].variance_of_mean(double(count_));
+            if (more > 0)
+                to.mean[i] =
+                    to.mean[i] * (1 - share) + film->moments()[i].mean(double(more)) * share;
+        }
     });
 }
 

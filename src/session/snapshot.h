@@ -49,8 +49,8 @@ private:
     std::shared_ptr<Shelf> shelf_ = std::make_shared<Shelf>();
 };
 
-/// Copies the film's mean and variance. `has_groups`: see Film::set_groups(). Must not run during Film::end_pass().
-void fill_snapshot(const Film& film, bool has_groups, Snapshot& to);
+/// Copies the film's mean and variance. Must not run during Film::end_pass().
+void fill_snapshot(const Film& film, Snapshot& to);
 
 /// The images of renderings that are finished, each with another seed.
 class SeedMean {
@@ -65,7 +65,7 @@ public:
     void load(SectionReader& from, uint64_t pixels);
 
 private:
-    std::vector<Film::Moments> moments_;
+    std::vector<PixelMoments> moments_;
     uint64_t passes_ = 0;
     int32_t count_ = 0;
 };

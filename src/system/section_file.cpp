@@ -17,7 +17,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little);
 
 constexpr char kMark[8] = {'E', 'T', 'E', 'N', 'D', 'U', 'E', '\x1a'};
-constexpr uint32_t kVersion = 5;
+constexpr uint32_t kVersion = 6;
 constexpr size_t kMostSections = 64, kBuffer = 1 << 16;
 
 struct FileHeader {

@@ -194,10 +194,13 @@ def test_arrays_are_not_copied(cornell: et.Scene) -> None:
     assert result.image is image and result.image.ctypes.data == image.ctypes.data
     assert not image.flags.owndata  # a capsule owns the renderer's vector
     sums = result.film.sums
-    assert sums.shape == (24, 32, 3) and sums.dtype == np.float64 and sums.strides == (32 * 48, 48, 8)
+    assert sums.shape == (24, 32, 3) and sums.dtype == np.float64 and sums.strides == (32 * 40, 40, 8)
     assert not sums.flags.writeable
     assert sums.ctypes.data == result.film.sums.ctypes.data
-    assert result.film.squares.ctypes.data == sums.ctypes.data + 24
+    deviations = result.film.deviations
+    assert deviations.dtype == np.float32 and deviations.ctypes.data == sums.ctypes.data + 24
+    n = result.film.passes
+    np.testing.assert_allclose(deviations**2 / (n * (n - 1)), result.variance, rtol=1e-5)
     np.testing.assert_allclose(sums / result.film.passes, image, rtol=1e-6)
 
 

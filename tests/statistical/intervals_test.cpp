@@ -22,7 +22,7 @@ Snapshot rendering(const Scene& scene, uint64_t seed, uint64_t spp) {
     Renderer renderer(scene, settings);
     renderer.run([](const Progress&) {}, std::atomic<bool>(false));
     Snapshot snapshot;
-    fill_snapshot(renderer.film(), false, snapshot);
+    fill_snapshot(renderer.film(), snapshot);
     return snapshot;
 }
 

@@ -421,8 +421,8 @@ TEST(Film, NotesTheBrightestPassOfEachPixel) {
             Passes passes(film);
             std::vector<LargestPass> expected(kLarge.pixel_count());
             for (uint32_t pass = 0; pass < kPasses; ++pass) {
-                const std::vector<Film::Moments> before(film.moments().begin(),
-                                                        film.moments().end());
+                const std::vector<PixelMoments> before(film.moments().begin(),
+                                                       film.moments().end());
                 passes.add(pass % 2 == 0 ? 500 : 0);
                 for (size_t i = 0; i < expected.size(); ++i) {
                     const float value =

@@ -14,7 +14,7 @@ namespace {
 /// The buffer's sums, each of them red.
 std::vector<float> folded(SplatBuffer& buffer, size_t pixels) {
     std::vector<Rgb> sums(pixels);
-    buffer.fold_into(sums);
+    buffer.fold_into(0, sums);
     std::vector<float> red;
     for (const Rgb& s : sums) red.push_back(s.r);
     return red;
@@ -30,7 +30,7 @@ TEST(SplatBuffer, AddsToWhatIsThereAndIsEmptyAfterwards) {
     buffer.add(1, {0.25f, -2, 8});
     buffer.add(1, {0.5f, 1, 0});
     std::vector<Rgb> sums(3, Rgb(1));
-    buffer.fold_into(sums);
+    buffer.fold_into(0, sums);
     EXPECT_EQ(sums[1].r, 1.75f);
     EXPECT_EQ(sums[1].g, 0);
     EXPECT_EQ(sums[1].b, 9);
@@ -95,7 +95,7 @@ TEST(SplatBuffer, RadianceOf1e8OnOnePixelDoesNotWrap) {
     SplatBuffer buffer(1, 1);
     for (int i = 0; i < 1 << 20; ++i) buffer.add(0, {1e8f, 100, 1e12f});
     std::vector<Rgb> sum(1);
-    buffer.fold_into(sum);
+    buffer.fold_into(0, sum);
     EXPECT_EQ(sum[0].r, 1e8f * 0x1p20f);
     EXPECT_EQ(sum[0].g, 100 * 0x1p20f);
     EXPECT_EQ(sum[0].b, 1e12f * 0x1p20f);
@@ -156,7 +156,7 @@ TEST(SplatBuffer, LeavesOutWhatIsNotFinite) {
     buffer.add(0, {2, 1e20f, -0.5f});
     EXPECT_EQ(buffer.rejected(), 6u);
     std::vector<Rgb> sum(1);
-    buffer.fold_into(sum);
+    buffer.fold_into(0, sum);
     EXPECT_EQ(sum[0], Rgb(2, 1e20f, -0.5f));
     buffer.clear();
     EXPECT_EQ(buffer.rejected(), 0u);

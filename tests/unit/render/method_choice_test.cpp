@@ -266,7 +266,7 @@ std::vector<std::vector<float>> passes_of(const Scene& scene, RenderSettings set
         [&](const Progress&) {
             auto& image = images.emplace_back();
             for (size_t i = 0; i < before.size(); ++i) {
-                const Film::Moments& m = r.film().moments()[i];
+                const PixelMoments& m = r.film().moments()[i];
                 const auto sum = float((m.sum[0] + m.sum[1] + m.sum[2]) / 3);
                 image.push_back(sum - before[i]);
                 before[i] = sum;
