@@ -16,7 +16,7 @@ import statistics
 
 # Bytes of a pixel; tests/unit/render/ranks_test.cpp counts them.
 EXCHANGED = 12  # Of a pass: three floats.
-GATHERED = 60  # Of the film: sums of values and of squares, the luminance of a pass, squares of luminance.
+GATHERED = 44  # Of the film: sums and deviations of three channels, the deviation of the luminance, the luminance of a pass.
 INTERVAL = 60  # Seconds between two checkpoints, or two images.
 MOST_OF_TIME = 0.01  # That they take; otherwise there are fewer of them.
 LONGEST_WAIT = 900  # Seconds to the next checkpoint.
