@@ -17,12 +17,6 @@ namespace {
 
 constexpr const char* kTooMany = "too many files wait to be written; try again";
 
-Estimator estimator_named(const std::string& name) {
-    for (const Estimator e : {Estimator::Unbiased, Estimator::Consistent, Estimator::Biased})
-        if (name == to_string(e)) return e;
-    throw std::runtime_error(fmt::format("\"{}\" is no kind of estimator", name));
-}
-
 /// What was asked for, without limits.
 RenderRequest request_of(const CheckpointHeader& header) {
     RenderRequest r;

@@ -79,6 +79,12 @@ IntervalKind interval_kind(Estimator estimator, SamplerKind sampler, bool has_gr
     return sampler == SamplerKind::Sobol ? IntervalKind::Upper : IntervalKind::Confidence;
 }
 
+Estimator estimator_named(const std::string& name) {
+    for (const Estimator e : {Estimator::Unbiased, Estimator::Consistent, Estimator::Biased})
+        if (name == to_string(e)) return e;
+    throw std::runtime_error(fmt::format("\"{}\" is no kind of estimator", name));
+}
+
 Session::Session(Load load, int threads, RunKeeping keeping)
     : load_(std::move(load)), threads_(threads),
       folder_(keeping.folder.empty() ? std::nullopt : std::optional<RunFolder>(keeping.folder)),

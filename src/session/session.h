@@ -50,6 +50,8 @@ enum class IntervalKind {
 };
 const char* to_string(IntervalKind kind);
 IntervalKind interval_kind(Estimator estimator, SamplerKind sampler, bool has_groups, int seeds);
+/// The kind of which to_string() gives this name. Throws std::runtime_error if there is none.
+Estimator estimator_named(const std::string& name);
 
 struct ConvergencePoint {
     uint64_t passes;

@@ -23,7 +23,7 @@ struct Snapshot {
     uint64_t passes = 0;
     int width = 0, height = 0;
     std::vector<Rgb> mean;
-    std::vector<Rgb> variance;  ///< Of the mean; zero with fewer than two passes.
+    std::vector<Rgb> variance;  ///< Of the mean; zero below two passes, empty of an image file.
     std::shared_ptr<const nlohmann::json> report;  ///< For the file that the image is saved in.
 };
 

@@ -65,6 +65,7 @@ Admission Api::admit(const Request& request) {
     a.refusal = refuse(request, options_.token, options_.hosts);
     a.has_token = !a.refusal && request.path().starts_with("/v1");
     a.is_events = !a.refusal && request.method == "GET" && request.path() == "/v1/events";
+    a.brings_file = a.has_token && request.method == "POST" && request.path() == "/v1/images";
     return a;
 }
 
@@ -104,6 +105,7 @@ void Api::handle(const Request& request, std::function<void(Reply)> done) try {
             return reply;
         });
     }
+    if (path == "/v1/images") return images(request, done);
     if (path == "/v1/run")
         return needs(request.method == "POST"), run(parse_object(request.body), done);
     if (path == "/v1/save")
@@ -156,7 +158,7 @@ void Api::look_at_scene_file() {
 
 uint64_t Api::revision() {
     look_at_scene_file();
-    return session_.revision() + own_revision_;
+    return session_.revision() + own_revision_ + opened_.version();
 }
 
 std::string Api::event() {
@@ -166,7 +168,8 @@ std::string Api::event() {
                  {"scene_version", session_.scene_version()},
                  {"load_error", session_.load_error()},
                  {"scene_changed", is_scene_changed_},
-                 {"kept_version", session_.kept_version()}});
+                 {"kept_version", session_.kept_version()},
+                 {"images_version", opened_.version()}});
 }
 
 Reply Api::state() {
@@ -210,6 +213,9 @@ Reply Api::state() {
     j["kept_version"] = session_.kept_version();
     j["kept"] = json::array();
     for (const KeptRun& k : session_.kept()) j["kept"].push_back(to_json(k));
+    j["images_version"] = opened_.version();
+    j["images"] = json::array();
+    for (const auto& [id, image] : opened_.list()) j["images"].push_back(to_json(id, *image));
     j["integrators"] =
         json::parse(etendue::to_json(choose_plugins(plugin_list(), "integrator", "")).dump());
     j["layers"] = json::array();

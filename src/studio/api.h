@@ -18,6 +18,7 @@
 #include "session/session.h"
 #include "session/workers.h"
 #include "studio/http.h"
+#include "studio/opened_images.h"
 #include "studio/scene_data.h"
 
 namespace etendue {
@@ -69,6 +70,10 @@ private:
     void image(const Request& request, const Done& done);
     void run(const nlohmann::json& body, const Done& done);
     void open(const nlohmann::json& body, const Done& done);
+    /// Opens an image whose file is the body, or removes one.
+    void images(const Request& request, const Done& done);
+    /// The image of a run, or of a view of an opened image; nullptr where the run has none yet.
+    std::shared_ptr<const Snapshot> shown(const std::string& run_or_view);
     void save(const nlohmann::json& body, const Done& done);
     Reply get_paths(const Request& request);
     Reply put_paths(const Request& request);
@@ -89,6 +94,7 @@ private:
 
     Session& session_;
     const ApiOptions options_;
+    OpenedImages opened_;
     std::string scene_folder_;
     SceneView view_;
     double charged_ = 0;  ///< Processor time of the server's thread that was charged to snapshots.

@@ -105,6 +105,17 @@ void Api::image(const Request& request, const Done& done) {
             return encode_image(part, PixelRows<Rgb>(r.pixels, r.width, r.height));
         });
     }
+    if (const auto opened = opened_.of_view(view)) {
+        const Snapshot& p = *opened->pixels;
+        if (p.width != g.crop_width || p.height != g.crop_height)
+            throw ApiError(409,
+                           fmt::format("{} has {} × {} pixels, but the image {} × {}", opened->file,
+                                       p.width, p.height, g.crop_width, g.crop_height));
+        part.passes = p.passes;
+        return send(done, [pixels = opened->pixels, part] {
+            return encode_image(part, PixelRows<Rgb>(pixels->mean, pixels->width, pixels->height));
+        });
+    }
     for (const AovInfo& a : aov_registry())
         if (view == a.name && view != "variance")
             return later(workers_, done, [data, part, view] {
@@ -145,17 +156,37 @@ void Api::image(const Request& request, const Done& done) {
     });
 }
 
+std::shared_ptr<const Snapshot> Api::shown(const std::string& run_or_view) {
+    if (const auto opened = opened_.of_view(run_or_view)) return opened->pixels;
+    return session_.snapshot(integer_of(run_or_view, "run"));
+}
+
+void Api::images(const Request& request, const Done& done) {
+    if (request.method == "DELETE") {
+        opened_.remove(query_integer(request, "image", 0));
+        return done(Reply::json("{}"));
+    }
+    if (request.method != "POST") throw ApiError(405, "this method is not possible here");
+    const std::string file = request.query("file").value_or("");
+    if (file.empty()) throw ApiError(422, "\"file\", the name of the file, is missing");
+    // The bytes are copied: a request is over when the reply is made.
+    later(workers_, done, [this, file, bytes = request.body] {
+        return Reply::json(dump({{"image", opened_.add(opened_image(bytes, file))}}));
+    });
+}
+
 Reply Api::pixel(const Request& request) {
     const int x = query_integer(request, "x", -1), y = query_integer(request, "y", -1),
-              w = query_integer(request, "w", 1), h = query_integer(request, "h", 1),
-              id = query_integer(request, "run", 0);
-    const auto snapshot = session_.snapshot(id);
+              w = query_integer(request, "w", 1), h = query_integer(request, "h", 1);
+    const auto opened = opened_.of_view(request.query("view").value_or(""));
+    const int id = opened ? 0 : query_integer(request, "run", 0);
+    const auto snapshot = opened ? opened->pixels : session_.snapshot(id);
     if (!snapshot) return Reply::json(dump({{"run", id}, {"passes", 0}}));
     check({x, y, w, h}, snapshot->width, snapshot->height);
-    const RunStatus status = session_.status(id);
+    const IntervalKind interval = opened ? opened->interval : session_.status(id).interval;
     const RectangleValues values = values_in(*snapshot, {x, y, w, h});
     json j{{"run", id},           {"passes", snapshot->passes},
-           {"mean", values.mean}, {"interval", to_string(status.interval)},
+           {"mean", values.mean}, {"interval", to_string(interval)},
            {"half", nullptr},     {"pixels", int64_t(w) * int64_t(h)},
            {"nan", values.nan},   {"infinite", values.infinite}};
     if (values.finite > 1) {
@@ -163,7 +194,7 @@ Reply Api::pixel(const Request& request) {
         j["largest"] = values.largest;
         j["variance"] = values.variance;
     }
-    if (snapshot->passes >= 2 && status.interval != IntervalKind::None && values.finite > 0) {
+    if (snapshot->passes >= 2 && interval != IntervalKind::None && values.finite > 0) {
         for (size_t c = 0; c < 3; ++c)
             j["half"][c] = interval_half_width(values.squared_error[c], snapshot->passes);
     }
@@ -213,11 +244,11 @@ void Api::worst(const Request& request, const Done& done) {
 }
 
 void Api::difference(const Request& request, const Done& done) {
-    const auto snapshot = session_.snapshot(query_integer(request, "run", 0));
-    const std::string against = request.query("against").value_or("");
+    const auto snapshot = shown(request.query("run").value_or("0"));
+    const std::string against = request.query("against").value_or("0");
     std::shared_ptr<const Snapshot> other;
     if (against != "reference")
-        other = session_.snapshot(query_integer(request, "against", 0));
+        other = shown(against);
     else if (!options_.reference)
         throw ApiError(404, "there is no reference");
     if (!snapshot || (against != "reference" && !other))

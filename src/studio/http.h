@@ -12,6 +12,8 @@ namespace etendue {
 
 /// The largest header and body of a request that are read.
 inline constexpr size_t kMostHeaderBytes = 8 << 10, kMostBodyBytes = 1 << 20;
+/// The largest body of a request that brings a file.
+inline constexpr size_t kMostFileBytes = 512 << 20;
 
 struct Request {
     std::string method, target;
@@ -65,7 +67,8 @@ struct ApiError : std::runtime_error {
 struct Admission {
     std::optional<Reply> refusal;  ///< If the request is rejected.
     bool has_token = false;
-    bool is_events = false;  ///< The reply is a stream of events.
+    bool is_events = false;    ///< The reply is a stream of events.
+    bool brings_file = false;  ///< Its body may have kMostFileBytes.
 };
 
 /// The interface between server and application. The server's thread calls all functions except `done`.

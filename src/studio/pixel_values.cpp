@@ -41,7 +41,7 @@ RectangleValues values_in(const Snapshot& s, const ImageRect& rect) {
             v.least[k] = v.finite > 0 ? std::min(v.least[k], value) : value;
             v.largest[k] = v.finite > 0 ? std::max(v.largest[k], value) : value;
             moments[k].add(value);
-            v.squared_error[k] += double(s.variance[i][int(k)]);
+            if (!s.variance.empty()) v.squared_error[k] += double(s.variance[i][int(k)]);
         }
         ++v.finite;
     });

@@ -86,6 +86,14 @@ json to_json(const KeptRun& run) {
     return j;
 }
 
+json to_json(int id, const OpenedImage& image) {
+    return {{"id", id},
+            {"file", image.file},
+            {"note", image.note},
+            {"width", image.pixels->width},
+            {"height", image.pixels->height}};
+}
+
 json to_json(const RunStatus& s) {
     json j = progress_of(s);
     j["integrator"] = s.request.integrator;

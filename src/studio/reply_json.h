@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "session/light_ray.h"
+#include "session/opened_image.h"
 #include "session/replay.h"
 #include "session/session.h"
 
@@ -22,6 +23,7 @@ nlohmann::json to_json(Rgb c);
 nlohmann::json progress_of(const RunStatus& s);
 nlohmann::json to_json(const RunStatus& s);
 nlohmann::json to_json(const KeptRun& run);
+nlohmann::json to_json(int id, const OpenedImage& image);
 nlohmann::json to_json(const SeedComparison::Method& m, const SeedSeries& series);
 /// The name of a technique in requests: connect-2-3.
 std::string key_of(const Technique& q);

@@ -47,9 +47,17 @@ std::string text(beast::string_view s) {
     return {s.data(), s.size()};
 }
 
+/// For the header; it decides how long the body may be, see limit_body().
 void set_limits(Parser& parser) {
     parser.header_limit(kMostHeaderBytes);
-    parser.body_limit(kMostBodyBytes);
+    parser.body_limit(kMostFileBytes);
+}
+
+/// Whether the body of the request, whose header is read, may be as long as the header says.
+bool limit_body(Parser& parser, bool brings_file) {
+    const size_t most = brings_file ? kMostFileBytes : kMostBodyBytes;
+    parser.body_limit(most);  // of one whose length is not known
+    return parser.content_length().value_or(0) <= most;
 }
 
 Request request_of(Parser& parser) {
@@ -65,8 +73,13 @@ Request request_of(Parser& parser) {
             .local_address = {}};
 }
 
-Reply refusal_of(const error_code& error) {
-    if (error == http::error::body_limit) return Reply::error(413, "the body is larger than 1 MiB");
+Reply refusal_of_body(bool brings_file) {
+    return Reply::error(413, fmt::format("the body is larger than {} MiB",
+                                         (brings_file ? kMostFileBytes : kMostBodyBytes) >> 20));
+}
+
+Reply refusal_of(const error_code& error, bool brings_file) {
+    if (error == http::error::body_limit) return refusal_of_body(brings_file);
     if (error == http::error::header_limit || error == http::error::buffer_overflow)
         return Reply::error(431, "the header is larger than 8 KiB");
     return Reply::error(400, "this is no HTTP request");
@@ -127,10 +140,12 @@ public:
     void read() {
         parser_.emplace();
         set_limits(*parser_);
+        admission_ = {};
         stream_.expires_after(kTimeout);
-        http::async_read(
-            stream_, buffer_, *parser_,
-            [self = shared_from_this()](const error_code& error, size_t) { self->on_read(error); });
+        http::async_read_header(stream_, buffer_, *parser_,
+                                [self = shared_from_this()](const error_code& error, size_t) {
+                                    if (self->can_read(error)) self->on_header();
+                                });
     }
 
 private:
@@ -139,27 +154,50 @@ private:
         write(std::move(reply));
     }
 
-    void on_read(const error_code& error) {
-        if (error == http::error::end_of_stream || error == beast::error::timeout) return close();
-        if (error) {
-            // Errors of the connection itself cannot be answered.
-            if (error.category() != http::make_error_code(http::error::bad_method).category())
-                return;
-            return refuse(refusal_of(error));
+    /// Answers or closes after an error.
+    bool can_read(const error_code& error) {
+        if (!error) return true;
+        if (error == http::error::end_of_stream || error == beast::error::timeout) {
+            close();
+            return false;
         }
-        keep_alive_ = parser_->get().keep_alive();
-        is_head_ = parser_->get().method() == http::verb::head;
+        // Errors of the connection itself cannot be answered.
+        if (error.category() == http::make_error_code(http::error::bad_method).category())
+            refuse(refusal_of(error, admission_.brings_file));
+        return false;
+    }
+
+    void on_header() {
         Request request = request_of(*parser_);
         request.local_address = local_address_;
-        Admission admission = handler_.admit(request);
-        if (admission.refusal) return write(std::move(*admission.refusal));
-        if (admission.has_token && !is_known_) {
+        admission_ = handler_.admit(request);
+        if (!limit_body(*parser_, admission_.brings_file))
+            return refuse(refusal_of_body(admission_.brings_file));
+        if (admission_.has_token && !is_known_) {
             if (common_.known >= Server::kMostConnections)
                 return refuse(Reply::error(503, "there are too many connections"));
             ++common_.known;
             is_known_ = true;
         }
-        if (admission.is_events) {
+        read_body();
+    }
+    /// In pieces, each with its own time limit.
+    void read_body() {
+        if (parser_->is_done()) return on_request();
+        stream_.expires_after(kTimeout);
+        http::async_read_some(stream_, buffer_, *parser_,
+                              [self = shared_from_this()](const error_code& error, size_t) {
+                                  if (self->can_read(error)) self->read_body();
+                              });
+    }
+
+    void on_request() {
+        keep_alive_ = parser_->get().keep_alive();
+        is_head_ = parser_->get().method() == http::verb::head;
+        Request request = request_of(*parser_);
+        request.local_address = local_address_;
+        if (admission_.refusal) return write(std::move(*admission_.refusal));
+        if (admission_.is_events) {
             if (common_.event_streams < Server::kMostEventStreams) return stream_events();
             return write(Reply::error(429, fmt::format("{} pages are open already; close one",
                                                        Server::kMostEventStreams)));
@@ -302,6 +340,7 @@ private:
     size_t written_ = 0, discarded_ = 0;
     bool is_known_ = false;  ///< A request had the token.
     bool keep_alive_ = false, is_head_ = false, is_event_stream_ = false, is_ended_ = false;
+    Admission admission_;  ///< Of the request that is read.
     uint64_t seen_ = 0;
     int idle_ = 0;
 };
@@ -479,11 +518,16 @@ Server::Serving::~Serving() {
 ParsedRequest parse_request(std::string_view bytes) {
     Parser parser;
     set_limits(parser);
-    parser.eager(true);
     error_code error;
-    parser.put(net::buffer(bytes.data(), bytes.size()), error);
+    const size_t header = parser.put(net::buffer(bytes.data(), bytes.size()), error);
+    if (!error && parser.is_header_done() && !limit_body(parser, false))
+        return {{}, refusal_of_body(false)};
+    parser.eager(true);
+    const std::string_view rest = bytes.substr(header);
+    if (!error && !parser.is_done() && !rest.empty())
+        parser.put(net::buffer(rest.data(), rest.size()), error);
     if (!error && !parser.is_done()) parser.put_eof(error);
-    if (error) return {{}, refusal_of(error)};
+    if (error) return {{}, refusal_of(error, false)};
     return {request_of(parser), {}};
 }
 

@@ -145,6 +145,41 @@ export class KeptList {
     }
 }
 
+/** The images of files that pages have opened. */
+export class ImageList {
+    /**
+     * @param {HTMLElement} parent
+     * @param {{open: (files: File[]) => void, show: (id: number) => void, remove: (id: number) => void, shown: () => string}} tell
+     */
+    constructor(parent, tell) {
+        this.tell = tell;
+        this.rows = element('div');
+        this.files = element('input', {type: 'file', id: 'image-files', multiple: true, hidden: true, accept: '.exr,.hdr,.pfm,.png,.jpg,.jpeg,.etd',
+            onchange: () => { tell.open([...this.files.files]); this.files.value = ''; }});
+        parent.append(this.rows, this.files, element('button', {type: 'button', id: 'open-images', textContent: 'Open images',
+            title: 'Images and kept runs of any folder, also by dropping them on the image', onclick: () => this.files.click()}));
+    }
+
+    /** @param {any[]} images */
+    update(images) {
+        const key = JSON.stringify([images, this.tell.shown()]);
+        if (this.rows.dataset.key === key) return;
+        this.rows.dataset.key = key;
+        const button = (/** @type {string} */ text, /** @type {any} */ image, /** @type {(id: number) => void} */ act) => element('button', {type: 'button',
+            textContent: text, 'aria-label': `${text} ${image.file}`, onclick: () => act(image.id)});
+        this.rows.replaceChildren(...images.map(image => element('div', {className: this.tell.shown() === viewOf(image.id) ? 'run shown' : 'run'}, [
+            element('div', {className: 'name', textContent: image.file}),
+            element('div', {className: 'figures', textContent: [`${image.width} × ${image.height}`, image.note].filter(Boolean).join(', ')}),
+            element('div', {className: 'bar'}, [button('Show', image, this.tell.show), button('Remove', image, this.tell.remove)])])));
+    }
+}
+
+/**
+ * The view that shows an opened image.
+ * @param {number} id
+ */
+export const viewOf = id => `opened:${id}`;
+
 export class RunForm {
     /**
      * @param {HTMLElement} parent @param {any[]} integrators

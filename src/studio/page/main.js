@@ -3,7 +3,7 @@
 
 import {Server, Refusal} from './server.js';
 import {View} from './view.js';
-import {KeptList, RunForm, RunList, describe, element, significant} from './controls.js';
+import {ImageList, KeptList, RunForm, RunList, describe, element, significant, viewOf} from './controls.js';
 import {drawPlot} from './plot.js';
 import {Space} from './space.js';
 import {PathEditor} from './paths.js';
@@ -99,9 +99,10 @@ async function refresh(place) {
         if (shown[place] !== s) return;
         s.isAsked = picture === null;
         if (picture) {
+            const isFirst = s.passes === 0;
             s.passes = Math.max(1, picture.passes);
             draw(place, picture, textOf(s, picture.passes));
-            if (isOfRun && place === 0) showPixel();
+            if ((isOfRun || openedIn(s)) && (place === 0 || isFirst)) showPixel();
         } else if (s.passes === 0 && place === 0 && s.view === 'image' && !view.pictures[0]) {
             const first = await server.image({view: 'first'});
             if (first && s.passes === 0 && shown[0] === s) draw(0, first, kLabels.first);
@@ -128,9 +129,17 @@ async function refresh(place) {
  */
 const optionText = view => [...tools.view.options].find((/** @type {any} */ o) => o.value === view)?.textContent ?? view;
 
+/**
+ * The opened image that a place shows.
+ * @param {Shown | null} s
+ */
+const openedIn = s => state?.images.find((/** @type {any} */ i) => viewOf(i.id) === s?.view) ?? null;
+
 /** @param {Shown} s @param {number} passes */
 function textOf(s, passes) {
     if (s.view === 'reference') return 'reference';
+    const opened = openedIn(s);
+    if (opened) return opened.file;
     return [s.run > 0 ? `run ${s.run}` : '', /** @type {any} */ (kLabels)[s.view] ?? optionText(s.view), s.run > 0 && passes > 0 ? `${passes} spp` : ''].filter(Boolean).join(', ');
 }
 
@@ -150,7 +159,7 @@ function label() {
 
 /** @param {0 | 1} place @param {number} run @param {string} what */
 function showIn(place, run, what) {
-    if (place === 0 || run > 0 || what === 'reference') shown[place] = {run, view: what, passes: 0, isAsked: false, busy: false, again: false, isRefused: false};
+    if (place === 0 || run > 0 || what === 'reference' || what.startsWith('opened:')) shown[place] = {run, view: what, passes: 0, isAsked: false, busy: false, again: false, isRefused: false};
     else shown[1] = null;
     tools.measured.textContent = '';
     tools.measure.disabled = !shown[1];
@@ -268,10 +277,11 @@ async function showPixel() {
     const isPixel = w * h === 1;
     const parts = [element('div', {textContent: isPixel ? `(${x}, ${y})` : `(${x}, ${y}) to (${x + w - 1}, ${y + h - 1}): ${w} × ${h} pixels`})];
     const describePixel = async (/** @type {Shown | null} */ s) => {
-        if (!s || s.run === 0) return;
-        const p = await server.get(`/v1/pixel?run=${s.run}&x=${x}&y=${y}&w=${w}&h=${h}`).catch(() => null);
+        const opened = openedIn(s);
+        if (!s || (s.run === 0 && !opened)) return;
+        const p = await server.get(`/v1/pixel?${opened ? `view=${s.view}` : `run=${s.run}`}&x=${x}&y=${y}&w=${w}&h=${h}`).catch(() => null);
         if (!p?.passes) return;
-        const kNames = {confidence: '± 95 %', upper: '± upper bound (sobol)', 'noise only': '± noise only, without bias', none: runs.get(s.run)?.seeds ? 'no interval: several seeds' : 'no interval: one chain'};
+        const kNames = {confidence: '± 95 %', upper: '± upper bound (sobol)', 'noise only': '± noise only, without bias', none: opened ? 'no interval' : runs.get(s.run)?.seeds ? 'no interval: several seeds' : 'no interval: one chain'};
         const cells = (/** @type {string} */ scope, /** @type {string} */ name, /** @type {string[]} */ values) => element('tr', {}, [element('th', {scope, textContent: name}),
             ...values.map(textContent => element(scope === 'col' ? 'th' : 'td', {textContent}))]);
         const kChannels = ['red', 'green', 'blue'];
@@ -280,7 +290,7 @@ async function showPixel() {
         const rows = isPixel
             ? kChannels.map((name, c) => cells('row', name, [significant(p.mean[c], 6), p.half ? `± ${significant(p.half[c], 3)}` : '', p.reference ? `reference ${significant(p.reference[c], 6)}` : '']))
             : [cells('col', '', kChannels), ...Object.entries(statistics).filter(([, v]) => v).map(([name, v]) => cells('row', name, v.map((/** @type {number} */ x) => significant(x, 4))))];
-        parts.push(element('div', {className: 'soft', textContent: `run ${s.run}, ${p.passes} spp, ${/** @type {any} */ (kNames)[p.interval]}`}));
+        parts.push(element('div', {className: 'soft', textContent: `${opened ? [opened.file, opened.note].filter(Boolean).join(', ') : `run ${s.run}, ${p.passes} spp`}, ${/** @type {any} */ (kNames)[p.interval]}`}));
         parts.push(element('table', {}, rows));
         if (p.nan + p.infinite > 0) parts.push(element('div', {className: 'error', textContent: `left out: ${p.nan} pixels NaN, ${p.infinite} infinite`}));
     };
@@ -305,9 +315,10 @@ async function measure() {
     if (!b) return;
     tools.measured.textContent = '…';
     try {
-        const d = await server.get(`/v1/difference?run=${a.run}&against=${b.view === 'reference' ? 'reference' : b.run}`);
-        const other = b.view === 'reference' ? 'the reference' : `run ${b.run}, ${d.against_passes} spp`;
-        tools.measured.textContent = `relMSE ${significant(d.rel_mse)}, FLIP ${significant(d.flip)}: run ${a.run}, ${d.passes} spp, against ${other}`
+        const key = (/** @type {Shown} */ s) => s.run > 0 ? s.run : s.view;
+        const name = (/** @type {Shown} */ s, /** @type {number} */ passes) => s.view === 'reference' ? 'the reference' : openedIn(s)?.file ?? `run ${s.run}, ${passes} spp`;
+        const d = await server.get(`/v1/difference?run=${key(a)}&against=${key(b)}`);
+        tools.measured.textContent = `relMSE ${significant(d.rel_mse)}, FLIP ${significant(d.flip)}: ${name(a, d.passes)}, against ${name(b, d.against_passes)}`
             + (d.not_finite ? `; ${d.not_finite} pixels that are not finite are left out of relMSE` : '');
     } catch (e) {
         tools.measured.textContent = /** @type {Error} */ (e).message;
@@ -323,7 +334,7 @@ function makeTools() {
         ['colours', 'false colours', 'relative difference', 'signed difference', 'squared difference'].map((t, i) => element('option', {value: i, textContent: t})));
     tools.against = element('select', {id: 'against', onchange: () => {
         const value = tools.against.value;
-        if (value === 'reference') showIn(1, 0, 'reference');
+        if (value === 'reference' || value.startsWith('opened:')) showIn(1, 0, value);
         else showIn(1, Number(value), 'image');
     }});
     tools.wipe = number({id: 'wipe', min: 0, max: 1, step: 0.01, value: 0.5, oninput: () => { view.wipe = Number(tools.wipe.value); view.redraw(); }});
@@ -400,6 +411,8 @@ async function updateViewOptions() {
         }
         if (tools.listed.run !== shown[0].run) return;
     }
+    const opened = openedIn(shown[0]);
+    if (opened) options.push([shown[0].view, opened.file]);
     setOptions(tools.view, options, 'image');
     if (!options.some(([value]) => value === shown[0].view)) showIn(0, shown[0].run, 'image');
     tools.view.value = shown[0].view;
@@ -407,9 +420,29 @@ async function updateViewOptions() {
 
 // ---------------------------------------------------------------------------------------- runs
 
-const list = new RunList(at('run-list'), {act, shown: () => shown[0].run, show: run => showIn(0, run, tools.view.value || 'image')});
+const list = new RunList(at('run-list'), {act, shown: () => shown[0].run, show: run => showIn(0, run, openedIn(shown[0]) ? 'image' : tools.view.value || 'image')});
 
 const kept = new KeptList(at('kept-list'), {open: file => report(begin({action: 'open', file})), look: () => report(server.post('/v1/run', {action: 'list'}))});
+
+const images = new ImageList(at('image-list'), {open: files => report(openImages(files)), show: showOpened,
+    remove: id => report(server.removeImage(id)), shown: () => shown[0].view});
+
+/** @param {number} id */
+function showOpened(id) {
+    showIn(0, 0, viewOf(id));
+    report(updateViewOptions());
+}
+
+/**
+ * Opens files one after the other, and shows the last one.
+ * @param {File[]} files
+ */
+async function openImages(files) {
+    let last = 0;
+    for (const file of files) last = await server.openImage(file);
+    await update();
+    if (last > 0) showOpened(last);
+}
 
 function updateRuns() {
     const all = [...runs.values()];
@@ -417,6 +450,8 @@ function updateRuns() {
     /** @type {[string, string][]} */
     const others = [['0', 'nothing'], ...all.map(r => /** @type {[string, string]} */ ([String(r.id), `run ${r.id}: ${r.integrator}`]))];
     if (state?.has_reference) others.push(['reference', 'reference']);
+    for (const i of state?.images ?? []) others.push([viewOf(i.id), i.file]);
+    images.update(state?.images ?? []);
     setOptions(tools.against, others, '0');
     if (pane === 'image') drawPlot(at('plot'), all);
 }
@@ -514,7 +549,7 @@ function showOtherScene(scene) {
 /** @param {any} event */
 async function onEvent(event) {
     const isNew = event.runs.length !== runs.size || event.runs.some((/** @type {any} */ r) => !runs.has(r.id)) || event.scene_version !== state.scene_version
-        || event.load_error !== state.load_error || event.kept_version !== state.kept_version;
+        || event.load_error !== state.load_error || event.kept_version !== state.kept_version || event.images_version !== state.images_version;
     if (isNew) await update();
     for (const r of event.runs) {
         const run = runs.get(r.id);
@@ -525,7 +560,8 @@ async function onEvent(event) {
         if (r.error && (!hadError || !last || r.seconds > 1.05 * last[1])) run.history.push([r.passes, r.seconds, ...r.error]);
     }
     banner('changed', event.scene_changed ? 'The scene changed on the disk.' : '', 'Load it again', () => report(server.post('/v1/run', {action: 'reload'})));
-    if (shown[0].run === 0 && runs.size > 0) showIn(0, newest(), 'image');
+    if (shown[0].run === 0 && runs.size > 0 && !openedIn(shown[0])) showIn(0, newest(), 'image');
+    if (shown[1]?.view.startsWith('opened:') && !openedIn(shown[1])) showIn(1, 0, '');
     if (shown[0].run > 0 && !runs.has(shown[0].run) && runs.size > 0) showIn(0, newest(), 'image');
     // More techniques are found as the run goes on.
     const run = runs.get(shown[0].run);
@@ -609,6 +645,12 @@ document.addEventListener('keydown', e => {
     else return;
     e.preventDefault();
 });
+at('view').addEventListener('dragover', (/** @type {DragEvent} */ e) => e.preventDefault());
+at('view').addEventListener('drop', (/** @type {DragEvent} */ e) => {
+    e.preventDefault();
+    report(openImages([...e.dataTransfer?.files ?? []]));
+});
+
 document.addEventListener('visibilitychange', () => { refresh(0); refresh(1); });
 
 const kSpokenInterval = 10000;

@@ -48,6 +48,15 @@ export class Server {
     /** @param {string} path @param {object} body */
     async post(path, body) { return (await this.fetch(path, {method: 'POST', body: JSON.stringify(body)})).json(); }
 
+    /** @param {File} file @returns {Promise<number>} The id of the image that is opened. */
+    async openImage(file) {
+        const response = await this.fetch(`/v1/images?file=${encodeURIComponent(file.name)}`, {method: 'POST', body: file});
+        return (await response.json()).image;
+    }
+
+    /** @param {number} image */
+    async removeImage(image) { await this.fetch(`/v1/images?image=${image}`, {method: 'DELETE'}); }
+
     /** @param {Record<string, string | number>} query @returns {Promise<Picture | null>} null: nothing newer. */
     async image(query) {
         const text = Object.entries(query).map(([k, v]) => `${k}=${encodeURIComponent(v)}`).join('&');

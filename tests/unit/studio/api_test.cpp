@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "image/image.h"
+#include "image/image_io.h"
 #include "image_body.h"
 #include "run_program.h"
 #include "studio/api.h"
@@ -405,6 +406,79 @@ TEST_F(ApiTest, KeptRunsAreListedAndOpened) {
     EXPECT_EQ(json::parse(get("/v1/pixel?x=3&y=4&run=" + id).body)["passes"], 3);
     EXPECT_EQ(post("/v1/run", {{"action", "continue"}, {"run", run}, {"spp", 5}}).status, 200);
     EXPECT_TRUE(wait_for([&] { return session->status(run).passes == 5; }));
+}
+
+TEST_F(ApiTest, ImagesOfFilesAreShownBesideRuns) {
+    open();
+    const int run = finished_run({{"integrator", "bdpt"}});
+    EXPECT_EQ(post("/v1/save", {{"run", run}, {"file", "own.exr"}}).status, 200);
+    const auto bring = [&](const std::string& name, const std::string& bytes) {
+        const Reply reply = ask("POST", "/v1/images?file=" + name, bytes);
+        EXPECT_EQ(reply.status, 200) << reply.body;
+        return json::parse(reply.body).value("image", 0);
+    };
+    const auto state = [&] { return json::parse(get("/v1/state").body); };
+    const auto version = [&] { return json::parse(api->event())["images_version"]; };
+    const json before = version();
+    const uint64_t revision = api->revision();
+    const std::string own = "opened:" + std::to_string(bring("own.exr", saved("own.exr")));
+    EXPECT_NE(version(), before);
+    EXPECT_NE(api->revision(), revision);
+    EXPECT_EQ(state()["images"],
+              json::array(
+                  {{{"id", 1}, {"file", "own.exr"}, {"note", ""}, {"width", 16}, {"height", 16}}}));
+
+    const std::string of_run = std::to_string(run);
+    EXPECT_EQ(get("/v1/image?view=" + own).body.substr(64),
+              get("/v1/image?view=image&run=" + of_run).body.substr(64));
+    json of_file = json::parse(get("/v1/pixel?x=3&y=4&view=" + own).body),
+         in_run = json::parse(get("/v1/pixel?x=3&y=4&run=" + of_run).body);
+    EXPECT_EQ(of_file["mean"], in_run["mean"]);
+    EXPECT_TRUE(of_file["half"].is_null());
+    EXPECT_EQ(of_file["interval"], "none");
+    for (const std::string& pair :
+         {"run=" + own + "&against=" + of_run, "run=" + of_run + "&against=" + own}) {
+        const json d = json::parse(get("/v1/difference?" + pair).body);
+        EXPECT_EQ(d["rel_mse"], 0) << d;
+        EXPECT_EQ(d["flip"], 0) << d;
+    }
+
+    // Of another size, and what is not an image.
+    Image large = rgb_image(20, 16, std::vector<Rgb>(320, Rgb(0.25f)));
+    large.attributes["etendue.denoised"] = std::string("2.3");
+    const std::string file = (folder.path() / "large.exr").string();
+    write_image(file, large);
+    const std::string other = "opened:" + std::to_string(bring("large.exr", read_text(file)));
+    EXPECT_EQ(state()["images"][1]["note"], "denoised");
+    EXPECT_EQ(get("/v1/image?view=" + other).status, 409);
+    EXPECT_EQ(get("/v1/difference?run=" + own + "&against=" + other).status, 409);
+    for (const char* name : {"a.exr", "a.etd", "a.png"})
+        EXPECT_EQ(ask("POST", std::string("/v1/images?file=") + name, "no image").status, 422)
+            << name;
+    EXPECT_EQ(ask("POST", "/v1/images", saved("own.exr")).status, 422);
+
+    EXPECT_EQ(ask("DELETE", "/v1/images?image=1").status, 200);
+    EXPECT_EQ(ask("DELETE", "/v1/images?image=1").status, 404);
+    EXPECT_EQ(get("/v1/image?view=" + own).status, 404);
+    EXPECT_EQ(state()["images"].size(), 1u);
+}
+
+TEST_F(ApiTest, KeptRunsOfAnyFolderAreShownAsImages) {
+    runs = (folder.path() / "runs").string();
+    fs::create_directory(runs);
+    open();
+    const int run = finished_run({{"integrator", "bdpt"}, {"spp", 3}});
+    session->settle();
+    const std::string file = read_text(fs::path(runs) / "test-bdpt-1.etd");
+    const Reply reply = ask("POST", "/v1/images?file=elsewhere.etd", file);
+    ASSERT_EQ(reply.status, 200) << reply.body;
+    EXPECT_EQ(json::parse(get("/v1/state").body)["images"][0]["note"], "bdpt, 3 spp");
+    const json of_file = json::parse(get("/v1/pixel?x=3&y=4&view=opened:1").body),
+               in_run = json::parse(get("/v1/pixel?x=3&y=4&run=" + std::to_string(run)).body);
+    for (const char* same : {"mean", "half", "passes", "interval"})
+        EXPECT_EQ(of_file[same], in_run[same]) << same;
+    EXPECT_FALSE(of_file["half"].is_null());
+    EXPECT_EQ(ask("POST", "/v1/images?file=torn.etd", file.substr(0, file.size() / 2)).status, 422);
 }
 
 TEST_F(ApiTest, OnlyFilesOfTheFolderAreOpened) {

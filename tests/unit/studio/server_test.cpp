@@ -129,10 +129,12 @@ public:
         a.refusal = refuse(request, "secret", {"known.example"});
         a.has_token = !a.refusal && request.path().starts_with("/v1");
         a.is_events = a.has_token && request.path() == "/v1/events";
+        a.brings_file = a.has_token && request.path() == "/v1/images";
         return a;
     }
-    void handle(const Request&, std::function<void(Reply)> done) override {
+    void handle(const Request& request, std::function<void(Reply)> done) override {
         fail_if(fails_to_handle);
+        body_bytes = request.body.size();
         if (!forgets) done(Reply::json("{}"));
     }
     uint64_t revision() override { return ++revision_; }
@@ -142,6 +144,7 @@ public:
     }
     std::atomic<bool> fails_to_admit{false}, fails_to_handle{false}, fails_to_tell{false},
         forgets{false};
+    std::atomic<size_t> body_bytes{0};  ///< Of the last request.
 
 private:
     static void fail_if(bool fails) {
@@ -270,6 +273,31 @@ TEST(Server, OutlivesExceptions) {
 }
 
 /// The page can be opened at each address that is printed.
+TEST(Server, OnlyRequestsThatBringFilesAreLong) {
+    StubHandler handler;
+    Server server("127.0.0.1", 0);
+    const Server::Serving serving = server.start(handler);
+    constexpr size_t kLong = 3 << 20;
+    const std::string body(kLong, 'x');
+    EXPECT_EQ(ask(server.port(), "POST", "/v1/images?file=a.exr", body), 200);
+    EXPECT_EQ(handler.body_bytes, kLong);
+    EXPECT_EQ(ask(server.port(), "POST", "/v1/run", body), 413);
+
+    // Of unknown length.
+    const auto in_chunks = [&](const std::string& target, const std::string& token) {
+        const Client client(server.port());
+        client.send("POST " + target + " HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer " +
+                    token + "\r\nConnection: close\r\nTransfer-Encoding: chunked\r\n\r\n");
+        for (int i = 0; i < 3; ++i) client.send("100000\r\n" + body.substr(0, 1 << 20) + "\r\n");
+        client.send("0\r\n\r\n");
+        return status_of(client.receive());
+    };
+    EXPECT_EQ(in_chunks("/v1/images?file=a.exr", "secret"), 200);
+    EXPECT_EQ(handler.body_bytes, kLong);
+    EXPECT_EQ(in_chunks("/v1/run", "secret"), 413);
+    EXPECT_EQ(in_chunks("/v1/images?file=a.exr", "guess"), 413);
+}
+
 TEST(Server, AnswersAtTheAddressesThatItStates) {
     for (const char* address : {"127.0.0.1", "0.0.0.0", "localhost", "::1", "::"}) {
         std::optional<Server> server;
