@@ -17,7 +17,7 @@ OpenedImage of_checkpoint(CheckpointFile checkpoint) {
     const auto snapshot = std::make_shared<Snapshot>();
     snapshot->width = film.geometry().crop_width;
     snapshot->height = film.geometry().crop_height;
-    fill_snapshot(film, film.has_groups(), *snapshot);
+    fill_snapshot(film, *snapshot);
     const SamplerKind sampler = sampler_named(header.condition("sampler"), "its sampler");
     return {.file = checkpoint.name(),
             .note = fmt::format("{}, {} spp", header.integrator, film.passes()),
