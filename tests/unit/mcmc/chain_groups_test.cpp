@@ -101,6 +101,78 @@ public:
     }
 };
 
+/// Two cells: a tenth of the states is in the first one, and bright. An independent sample consists of many states.
+class SamplesOfManyStates final : public PrimarySpace {
+public:
+    static constexpr float kBright = 10;
+    explicit SamplesOfManyStates(const FilmGeometry& geometry)
+        : PrimarySpace(1, add, TargetMap(geometry)) {}
+    void sample(uint64_t key, const ChainContext& c, std::vector<Find>& finds) const override {
+        constexpr int kStates = 32;
+        for (int i = 0; i < kStates; ++i) {
+            StateSpace::sample(hash_combine(key, uint64_t(i)), c, finds);
+            finds.back().weight /= kStates;
+        }
+    }
+    static std::array<double, 2> means() { return {0.1 * double(kBright), 0.9}; }
+
+private:
+    static void add(int, const SampleContext& c, Workspace& work) {
+        work.z.film_weight = 1;
+        c.sampler.seek(Stream::Eye, 0);
+        const bool is_bright = c.sampler.next_1d() < 0.1f;
+        const Rgb value(is_bright ? kBright : 1.0f);
+        c.sink.add({.technique = {Strategy::Splat, 3, 1},
+                    .emitter = nullptr,
+                    .contribution = value,
+                    .mis_weight = 1,
+                    .film = {is_bright ? 0.5f : 1.5f, 0.5f}},
+                   value);
+    }
+};
+
+/// The second generation of a group, from two samples and some large steps. A large step counts as a tenth of a sample, both
+/// in the normalisation and among the states from which chains start.
+TEST(ChainGroups, LargeStepsCountLessThanSamples) {
+    ToyPasses toy;
+    const SamplesOfManyStates space(toy.geometry());
+    std::array<Moments, 2> means;
+    for (uint64_t run = 0; run < 20000; ++run) {
+        ChainGroups groups(space,
+                           {.groups = 2, .chains = 1, .p_large = 0.5, .pool = 2, .large_step = 0.1},
+                           {{.chains = 1, .c = 0}});
+        CellSums first, second;
+        groups.advance(toy.pass(0, hash_combine(28, run), 8, first));
+        groups.commit();
+        groups.advance(toy.pass(2, hash_combine(28, run), 1, second));
+        for (size_t k = 0; k < 2; ++k) means[k].add(second.sums[k]);
+    }
+    for (size_t k = 0; k < 2; ++k)
+        EXPECT_NEAR(means[k].mean(), SamplesOfManyStates::means()[k],
+                    4 * std::sqrt(means[k].squared_error()))
+            << k;
+}
+
+/// In the midst of a generation, what the large steps of a group have found since its start says where its chains are, and
+/// improves only the scale of the other groups.
+TEST(ChainGroups, OwnFindsDoNotScale) {
+    ToyPasses toy;
+    const StayingSpace space(1, toy_sample, TargetMap(toy.geometry()));
+    std::array<Moments, kCells> means;
+    for (uint64_t run = 0; run < 40000; ++run) {
+        ChainGroups groups(space, {.groups = 2, .chains = 2, .p_large = 0.5, .pool = 4},
+                           {{.chains = 2, .c = 0}});
+        CellSums sums;
+        for (const uint32_t i : {0u, 2u, 4u}) {  // of the first group
+            sums.sums = {};
+            groups.advance(toy.pass(i, hash_combine(29, run), 8, sums));
+            groups.commit();
+        }
+        for (size_t k = 0; k < kCells; ++k) means[k].add(sums.sums[k]);
+    }
+    expect_exact(means, 0.01);
+}
+
 /// A pool that is thinned out before chains start has, in the mean, all of its samples, whatever their numbers are.
 TEST(ChainGroups, ThinningDoesNotDependOnTheSamples) {
     ToyPasses toy;
