@@ -297,12 +297,35 @@ def test_open_pbr(tmp_path: Path) -> None:
                    **OPEN_PBR)
     names = ("base_metalness", "specular_weight", "coat_weight", "coat_ior", "specular_roughness")
     assert [p[n] for n in names] == pytest.approx([1, 0.5, 0.25, 1.6, 0.3])
+    metal = surface(tmp_path, """color3f inputs:base_color = (1, 0, 0)
+        float inputs:base_metalness = 1
+        float inputs:subsurface_weight = 1""", **OPEN_PBR)
+    assert metal["base_color"]["value"] == [1, 0, 0]
+    bubble = surface(tmp_path, "float inputs:specular_ior = 0.75\nfloat inputs:specular_weight = 2", **OPEN_PBR)
+    assert (bubble["specular_ior"], bubble["specular_weight"]) == (0.75, 2)
     thin = load(tmp_path, CAMERA + SKY + material("float inputs:transmission_weight = 1\nbool inputs:geometry_thin_walled = 1", **OPEN_PBR))
     assert thin["/Quad.bsdf.thin_walled"] is True
     image(thin)
     cut = load(tmp_path, CAMERA + SKY + material("float inputs:geometry_opacity = 0.5", **OPEN_PBR))
     assert cut["/Quad.bsdf.opacity"] == 0.5
     image(cut)
+
+
+def test_colours_above_1_are_clamped(tmp_path: Path) -> None:
+    bright = "(2, 0.5, -1)"
+    stage = CAMERA + SKY + material(f"color3f inputs:diffuseColor = {bright}")
+    image(load(tmp_path, stage))
+    assert surface(tmp_path, f"color3f inputs:diffuseColor = {bright}")["base_color"]["value"] == [1, 0.5, 0]
+    for model, prefix, cloth in ((STANDARD, "", "sheen"), (OPEN_PBR, "_weight", "fuzz")):
+        inputs = f"float inputs:base{prefix} = 1\n" + "".join(
+            f"float inputs:{name}{prefix} = 0.5\ncolor3f inputs:{name}_color = {bright}\n" for name in ("transmission", "coat", cloth))
+        inputs += f"color3f inputs:base_color = {bright}"
+        made = load(tmp_path, CAMERA + SKY + material(inputs, **model))
+        for name in ("base_color", "transmission_color", "coat_color", "fuzz_color"):
+            assert made["/Quad.bsdf"][name]["value"] == [1, 0.5, 0], name
+        image(made)
+    opaque = load(tmp_path, CAMERA + SKY + material("color3f inputs:opacity = (2, 2, 2)", **STANDARD))
+    assert opaque["/Quad.bsdf"]["type"] == "twosided"
 
 
 def test_nodes_of_materialx(tmp_path: Path) -> None:

@@ -31,6 +31,11 @@ def luminance(color: Any) -> Any:
     return color
 
 
+def bounded(color: Any) -> Any:
+    """A constant colour within [0, 1], as what uses it clamps textures."""
+    return rgb([min(max(x, 0.0), 1.0) for x in color["value"]]) if color["type"] == "rgb" else color
+
+
 class Inputs:
     """The inputs of a surface shader. `material` collects the primvars of its textures."""
 
@@ -45,12 +50,12 @@ class Inputs:
         found = self._evaluate(self.shader, name, self.defaults[name], "rgb", 0)
         return found if isinstance(found, dict) else rgb(found if hasattr(found, "__len__") else [found] * 3)
 
-    def scalar(self, name: str) -> Any:
-        """A number in [0, 1], or a texture."""
+    def scalar(self, name: str, most: float = 1.0) -> Any:
+        """A number in [0, most], or a texture."""
         found = self._evaluate(self.shader, name, self.defaults[name], "r", 0)
         if isinstance(found, dict):
             return found
-        return min(max(float(luminance(rgb(found)) if hasattr(found, "__len__") else found), 0.0), 1.0)
+        return min(max(float(luminance(rgb(found)) if hasattr(found, "__len__") else found), 0.0), most)
 
     def number(self, name: str) -> float:
         """A number; of textures, the default and a warning."""

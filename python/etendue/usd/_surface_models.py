@@ -1,11 +1,12 @@
 """Which parameters of `openpbr` stand for the inputs of each surface shader."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from ._context import rgb
-from ._networks import Inputs, luminance, product
+from ._networks import Inputs, bounded, luminance, product
 
 Parameters = dict[str, Any]
 
@@ -31,12 +32,13 @@ def _emission(color: Any, strength: float) -> Any:
 
 
 def _ior(value: float) -> float:
-    return max(value, 1.0001)
+    """Below 1 for what is thinner than its surroundings."""
+    return max(value, 0.01)
 
 
 def _preview_surface(inputs: Inputs) -> Parameters:
     made: Parameters = {"specular_roughness": inputs.scalar("roughness"), "specular_ior": _ior(inputs.number("ior"))}
-    diffuse = inputs.color("diffuseColor")
+    diffuse = bounded(inputs.color("diffuseColor"))
     if int(inputs.number("useSpecularWorkflow")) == 1:
         specular = inputs.color("specularColor")
         for name, output in (("base_color", "base_color"), ("base_metalness", "metallic"), ("specular_weight", "specular_weight")):
@@ -59,12 +61,12 @@ def _share(inputs: Inputs, name: str) -> float:
     return min(max(inputs.number(name), 0.0), 1.0)
 
 
-def _base(inputs: Inputs, factor: str, subsurface: str) -> Any:
-    """The base colour, blended with that of subsurface scattering, which is taken for diffuse."""
-    base, weight = product(inputs.color("base_color"), inputs.number(factor)), _share(inputs, subsurface)
-    if weight == 0:
+def _base(inputs: Inputs, factor: str, subsurface: str, metalness: str) -> Any:
+    """The base colour, blended with that of subsurface scattering, which is taken for diffuse; metal has none."""
+    base, weight = bounded(product(inputs.color("base_color"), inputs.number(factor))), _share(inputs, subsurface)
+    if weight == 0 or inputs.scalar(metalness) == 1.0:
         return base
-    below = inputs.color("subsurface_color")
+    below = bounded(inputs.color("subsurface_color"))
     if base.get("type") == "rgb" == below.get("type"):
         return rgb([x + (y - x) * weight for x, y in zip(base["value"], below["value"])])
     return {"type": "mix", "value0": base, "value1": below, "weight": weight}
@@ -75,18 +77,18 @@ def _layers(inputs: Inputs, coat: str, ior: str, fuzz: str) -> Parameters:
     made: Parameters = {}
     if inputs.is_changed(coat):
         prefix = coat.removesuffix("_weight")
-        made.update(coat_weight=inputs.scalar(coat), coat_color=inputs.constant_color(f"{prefix}_color"),
-                    coat_roughness=_share(inputs, f"{prefix}_roughness"), coat_ior=_ior(inputs.number(ior)))
+        made.update(coat_weight=inputs.scalar(coat), coat_color=bounded(inputs.constant_color(f"{prefix}_color")),
+                    coat_roughness=_share(inputs, f"{prefix}_roughness"), coat_ior=max(inputs.number(ior), 1.0))
     if inputs.is_changed(fuzz):
         prefix = fuzz.removesuffix("_weight")
-        made.update(fuzz_weight=inputs.scalar(fuzz), fuzz_color=inputs.constant_color(f"{prefix}_color"),
+        made.update(fuzz_weight=inputs.scalar(fuzz), fuzz_color=bounded(inputs.constant_color(f"{prefix}_color")),
                     fuzz_roughness=_share(inputs, f"{prefix}_roughness"))
     return made
 
 
 def _standard_surface(inputs: Inputs) -> Parameters:
     return {
-        "base_color": _base(inputs, "base", "subsurface"),
+        "base_color": _base(inputs, "base", "subsurface", "metalness"),
         "base_diffuse_roughness": _share(inputs, "diffuse_roughness"),
         "base_metalness": inputs.scalar("metalness"),
         "specular_weight": inputs.scalar("specular"),
@@ -95,27 +97,27 @@ def _standard_surface(inputs: Inputs) -> Parameters:
         "specular_roughness_anisotropy": _share(inputs, "specular_anisotropy"),
         "specular_ior": _ior(inputs.number("specular_IOR")),
         "transmission_weight": inputs.scalar("transmission"),
-        "transmission_color": inputs.color("transmission_color"),
+        "transmission_color": bounded(inputs.color("transmission_color")),
         "thin_walled": bool(inputs.number("thin_walled")),
         **_layers(inputs, "coat", "coat_IOR", "sheen"),
         "emission": _emission(inputs.color("emission_color"), inputs.number("emission")),
-        "opacity": luminance(inputs.color("opacity")),
+        "opacity": luminance(bounded(inputs.color("opacity"))),
         "pane": False,
     }
 
 
 def _open_pbr(inputs: Inputs) -> Parameters:
     return {
-        "base_color": _base(inputs, "base_weight", "subsurface_weight"),
+        "base_color": _base(inputs, "base_weight", "subsurface_weight", "base_metalness"),
         "base_diffuse_roughness": _share(inputs, "base_diffuse_roughness"),
         "base_metalness": inputs.scalar("base_metalness"),
-        "specular_weight": inputs.scalar("specular_weight"),
+        "specular_weight": inputs.scalar("specular_weight", most=math.inf),
         "specular_color": inputs.color("specular_color"),
         "specular_roughness": inputs.scalar("specular_roughness"),
         "specular_roughness_anisotropy": _share(inputs, "specular_roughness_anisotropy"),
         "specular_ior": _ior(inputs.number("specular_ior")),
         "transmission_weight": inputs.scalar("transmission_weight"),
-        "transmission_color": inputs.color("transmission_color"),
+        "transmission_color": bounded(inputs.color("transmission_color")),
         "thin_walled": bool(inputs.number("geometry_thin_walled")),
         **_layers(inputs, "coat_weight", "coat_ior", "fuzz_weight"),
         "emission": _emission(inputs.color("emission_color"), inputs.number("emission_luminance")),
