@@ -13,7 +13,7 @@ from .principled import principled
 from .report import Refused, Report
 from .surfaces import (BLACK, SMOOTH, Surface, diffuse, dielectric, glass_gain, glossy, mixed, reflecting, rough, summed,
                        weighted_sum, with_normal)
-from .values import Values, as_color, is_black, is_texture, parameter, product
+from .values import Values, as_color, bounded, is_black, is_texture, parameter, product
 
 
 @dataclass
@@ -60,7 +60,7 @@ def read_shader(i: Input, values: Values) -> Surface:
 
 
 def _diffuse(node: Output, values: Values) -> Surface:
-    color, roughness = values.color(node.input("Color")), values.constant(node.input("Roughness"), node)
+    color, roughness = bounded(values.color(node.input("Color"))), values.constant(node.input("Roughness"), node)
     if roughness > 0:
         sigma, factor, albedo = rough_diffuse(min(roughness, 1.0), (1.0, 1.0, 1.0) if is_texture(color) else color)
         bsdf = {"type": "orennayar", "sigma": math.degrees(sigma), "reflectance": parameter(color if is_texture(color) else albedo)}
@@ -84,7 +84,7 @@ def _metallic(node: Output, values: Values) -> Surface:
     if node.node.fresnel_type == "F82":
         color, edge = values.color(node.input("Base Color")), values.color(node.input("Edge Tint"))
         if is_texture(color) or is_texture(edge):
-            bsdf = {"type": "openpbr", "base_metalness": 1.0, "specular_roughness": parameter(roughness), "base_color": parameter(color),
+            bsdf = {"type": "openpbr", "base_metalness": 1.0, "specular_roughness": bounded(roughness), "base_color": parameter(bounded(color)),
                     "specular_color": parameter(edge)}
             return with_normal(Surface(reflecting(bsdf)), node, values)
         # The tint is a factor of Schlick's reflectance at 82 degrees.
@@ -114,7 +114,7 @@ def _refraction(node: Output, values: Values) -> Surface:
 
 
 def _translucent(node: Output, values: Values) -> Surface:
-    color = parameter(values.color(node.input("Color")))
+    color = parameter(bounded(values.color(node.input("Color"))))
     bsdf = {"type": "diffusetransmission", "reflectance": 0.0, "transmittance": color}
     return with_normal(Surface(bsdf), node, values)
 
@@ -122,7 +122,7 @@ def _translucent(node: Output, values: Values) -> Surface:
 def _transparent(node: Output, values: Values) -> Surface:
     color = values.color(node.input("Color"))
     if not is_texture(color) and len(set(color)) == 1:
-        return Surface(BLACK.bsdf, opacity=1 - min(color[0], 1.0))
+        return Surface(BLACK.bsdf, opacity=1 - bounded(color[0]))
     # A pane with the index of refraction of air: light passes, with the colour.
     pane = {"type": "thindielectric", "int_ior": 1.0, "ext_ior": 1.0, "specular_transmittance": parameter(color)}
     return Surface(pane)

@@ -9,7 +9,7 @@ from typing import Any
 from .albedos import mean_reflectance
 from .nodes import Output
 from .surfaces import Surface, reflecting, rough, weighted_sum, with_normal
-from .values import Color, Value, Values, as_color, is_texture, parameter, product
+from .values import Color, Value, Values, as_color, bounded, is_texture, parameter, product
 
 _LEFT_OUT = ("Subsurface Weight", "Thin Film Thickness", "Anisotropic Rotation")
 
@@ -18,12 +18,12 @@ def principled(node: Output, values: Values) -> Surface:
     for name in _LEFT_OUT:
         if node.has(name) and (node.input(name).source() or node.input(name).value):
             values.warn(node, f"{name} has no effect")
-    color = _bounded(values.color(node.input("Base Color")))
-    glass = values.number(node.input("Transmission Weight"))
+    color = bounded(values.color(node.input("Base Color")))
+    glass = bounded(values.number(node.input("Transmission Weight")))
     bsdf = {
         "type": "openpbr",
         "base_color": parameter(color),
-        "base_metalness": values.number(node.input("Metallic")),
+        "base_metalness": bounded(values.number(node.input("Metallic"))),
         "specular_color": parameter(values.color(node.input("Specular Tint"))),
         "specular_ior": max(values.constant(node.input("IOR"), node), 0.01),
         **_facets(node, values),
@@ -32,7 +32,7 @@ def principled(node: Output, values: Values) -> Surface:
         **_sheen(node, values),
     }
     if node.has("Diffuse Roughness"):
-        bsdf["base_diffuse_roughness"] = min(max(values.constant(node.input("Diffuse Roughness"), node), 0.0), 1.0)
+        bsdf["base_diffuse_roughness"] = bounded(values.constant(node.input("Diffuse Roughness"), node))
     # The level is a factor of the reflectance along the normal, except of glass.
     if glass != 1.0:
         bsdf["specular_weight"] = product(values.number(node.input("Specular IOR Level")), 2.0)
@@ -46,12 +46,8 @@ def principled(node: Output, values: Values) -> Surface:
     if has_own_normal:
         surface = _below_a_coat(node, values, surface)
     surface.emission = product(values.color(node.input("Emission Color")), values.number(node.input("Emission Strength")))
-    surface.opacity = values.number(node.input("Alpha"))
+    surface.opacity = bounded(values.number(node.input("Alpha")))
     return surface
-
-
-def _bounded(color: Value) -> Value:
-    return color if is_texture(color) else tuple(min(max(c, 0.0), 1.0) for c in as_color(color))
 
 
 def _facets(node: Output, values: Values) -> dict[str, Any]:
@@ -59,14 +55,10 @@ def _facets(node: Output, values: Values) -> dict[str, Any]:
     here their mean square is."""
     roughness, anisotropy = values.number(node.input("Roughness")), values.constant(node.input("Anisotropic"), node)
     if anisotropy <= 0:
-        return {"specular_roughness": _unit(roughness)}
+        return {"specular_roughness": bounded(roughness)}
     ratio = 1 - 0.9 * min(anisotropy, 1.0)
     wider = product(roughness, ((ratio + 1 / ratio) / 2) ** 0.25)
-    return {"specular_roughness": _unit(wider), "specular_roughness_anisotropy": 1 - ratio}
-
-
-def _unit(value: Value) -> Value:
-    return value if is_texture(value) else min(max(value, 0.0), 1.0)
+    return {"specular_roughness": bounded(wider), "specular_roughness_anisotropy": 1 - ratio}
 
 
 def _constant_color(name: str, node: Output, values: Values) -> Color:
@@ -74,16 +66,16 @@ def _constant_color(name: str, node: Output, values: Values) -> Color:
     if is_texture(value):
         values.warn(node, f"{name} cannot be a texture")
         value = as_color(node.input(name).value)
-    return _bounded(value)
+    return bounded(as_color(value))
 
 
 def _coat(node: Output, values: Values, weight: Value) -> dict[str, Any]:
     if weight == 0.0:
         return {}
     return {
-        "coat_weight": _unit(weight),
+        "coat_weight": bounded(weight),
         "coat_color": parameter(_constant_color("Coat Tint", node, values)),
-        "coat_roughness": _unit(values.constant(node.input("Coat Roughness"), node)),
+        "coat_roughness": bounded(values.constant(node.input("Coat Roughness"), node)),
         "coat_ior": max(values.constant(node.input("Coat IOR"), node), 1.0),
     }
 
@@ -93,9 +85,9 @@ def _sheen(node: Output, values: Values) -> dict[str, Any]:
     if weight == 0.0:
         return {}
     return {
-        "fuzz_weight": _unit(weight),
+        "fuzz_weight": bounded(weight),
         "fuzz_color": parameter(_constant_color("Sheen Tint", node, values)),
-        "fuzz_roughness": _unit(values.constant(node.input("Sheen Roughness"), node)),
+        "fuzz_roughness": bounded(values.constant(node.input("Sheen Roughness"), node)),
     }
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from .albedos import microfacets, several_times
 from .nodes import Output
-from .values import Value, Values, is_black, is_texture, mixture, parameter, product
+from .values import Value, Values, bounded, is_black, is_texture, mixture, parameter, product
 
 SMOOTH = 0.01
 """Constant roughnesses below this one are mirrors or clear glass."""
@@ -35,7 +35,7 @@ def reflecting(bsdf: dict[str, Any]) -> dict[str, Any]:
 
 
 def diffuse(color: Value) -> Surface:
-    return Surface(reflecting({"type": "diffuse", "reflectance": parameter(color)}))
+    return Surface(reflecting({"type": "diffuse", "reflectance": parameter(bounded(color))}))
 
 
 BLACK = diffuse((0.0, 0.0, 0.0))
@@ -92,8 +92,7 @@ def glass_gain(ior: float, roughness: Value, node: Output) -> float:
 
 def mixed(weight: Value, a: Surface, b: Surface) -> Surface:
     """(1 - weight) a + weight b."""
-    if not is_texture(weight):
-        weight = min(max(weight, 0.0), 1.0)
+    weight = bounded(weight)
     if weight in (0.0, 1.0):
         return b if weight else a
     if a.opacity == 0.0 or b.opacity == 0.0:

@@ -52,6 +52,13 @@ def is_black(value: Value) -> bool:
     return not is_texture(value) and not any(as_color(value))
 
 
+def bounded(value: Value) -> Value:
+    """A constant within [0, 1], as etendue clamps textures of parameters with these bounds: it refuses other constants."""
+    if is_texture(value):
+        return value
+    return tuple(min(max(c, 0.0), 1.0) for c in value) if isinstance(value, tuple) else min(max(value, 0.0), 1.0)
+
+
 def parameter(value: Value) -> Any:
     """The value as a parameter of a plug-in."""
     return {"type": "rgb", "value": list(value)} if isinstance(value, tuple) else value

@@ -74,6 +74,21 @@ def test_nodes_reflect_what_they_do_in_cycles(studio, name):
     assert studio.ratio(SPHERE) == pytest.approx(expected, abs=0.02)
 
 
+@pytest.mark.parametrize(("kind", "name"), [
+    (PRINCIPLED, "Metallic"), (PRINCIPLED, "Transmission Weight"), (PRINCIPLED, "Alpha"), (PRINCIPLED, "Base Color"),
+    ("ShaderNodeBsdfDiffuse", "Color"), ("ShaderNodeBsdfTranslucent", "Color")])
+def test_values_above_1_are_clamped(studio, kind, name):
+    material, tree, node = studio.material(kind)
+    value = tree.nodes.new("ShaderNodeValue")
+    tree.links.new(value.outputs[0], node.inputs[name])
+    studio.sphere(material)
+    lit(studio, "world")
+    images = []
+    for value.outputs[0].default_value in (1.0, 1.5):
+        images.append(studio.render())
+    assert np.array_equal(*images)
+
+
 def two_shaders(studio, mixer, second, factor=0.3):
     """A plane whose material mixes or adds a diffuse node and another one; returns the other node."""
     material, tree, node = studio.material(mixer)
