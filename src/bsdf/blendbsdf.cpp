@@ -47,14 +47,14 @@ public:
         return nested_[0]->perturbs_normals() || nested_[1]->perturbs_normals();
     }
     Rgb mean_albedo() const override {
-        return lerp(clamp(luminance(weight_.mean()), 0, 1), nested_[0]->mean_albedo(),
+        return lerp(luminance(weight_.mean()), nested_[0]->mean_albedo(),
                     nested_[1]->mean_albedo());
     }
 
 private:
     /// Probability that a ray meets the first or the second material at `uv`.
     std::array<float, 2> shares(const TexturePoint& at) const {
-        const float w = clamp(weight_.eval_scalar(at), 0, 1);
+        const float w = weight_.eval_scalar(at);
         return {(1 - w) * nested_[0]->opacity(at), w * nested_[1]->opacity(at)};
     }
 

@@ -19,7 +19,7 @@ public:
         nested_->append(point, frame, weight, list);
     }
     float opacity(const TexturePoint& at) const override {
-        return clamp(opacity_.eval_scalar(at), 0, 1) * nested_->opacity(at);
+        return opacity_.eval_scalar(at) * nested_->opacity(at);
     }
     bool is_opaque() const override {
         return nested_->is_opaque() && opacity_.is_constant() && opacity_.eval_scalar(Vec2()) >= 1;

@@ -155,8 +155,8 @@ private:
 class MaterialContext {
 public:
     virtual ~MaterialContext() = default;
-    /// A constant or texture parameter; throws SceneError where a constant lies outside [0, hi]. The empty name is that
-    /// of an unnamed child.
+    /// A constant or texture parameter; throws SceneError where a constant lies outside [0, hi], to which textures are
+    /// clamped. The empty name is that of an unnamed child.
     virtual TextureRef texture(const Params& params, std::string_view name, Rgb fallback,
                                float hi = kInf) = 0;
     /// The nested materials in file order.

@@ -442,19 +442,18 @@ public:
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
         const TexturePoint at = point.texture_point();
-        const auto scalar = [&](const TextureRef& t) { return clamp(t.eval_scalar(at), 0, 1); };
-        const float metal = scalar(metalness_), glass = (1 - metal) * scalar(transmission_),
-                    opaque = (1 - metal) * (1 - scalar(transmission_));
+        const float metal = metalness_.eval_scalar(at), transmitting = transmission_.eval_scalar(at),
+                    glass = (1 - metal) * transmitting, opaque = (1 - metal) * (1 - transmitting);
         const Surface s = surface(at);
         const Vec2 alphas = constants_.alphas(s.alpha);
-        const Rgb base = base_color_.eval(at) * scalar(base_weight_);
+        const Rgb base = base_color_.eval(at) * base_weight_.eval_scalar(at);
         OpenPbrLobe lobe{.color = base,
                          .tint = s.tint,
                          .alpha_x = alphas.x,
                          .alpha_y = alphas.y,
                          .eta = s.eta,
                          .coat = s.coat,
-                         .fuzz = scalar(fuzz_),
+                         .fuzz = fuzz_.eval_scalar(at),
                          .slab = OpenPbrSlab::Opaque,
                          .table = nullptr};
         const Frame reflecting =
@@ -518,9 +517,9 @@ private:
         const float root =
             std::sqrt(std::min(sqr((ior_ - 1) / (ior_ + 1)) * std::max(factor, 0.0f), kLargestR0));
         s.eta = factor == 1 ? ior_ : ior_ < 1 ? (1 - root) / (1 + root) : (1 + root) / (1 - root);
-        s.coat = clamp(coat_.eval_scalar(at), 0, 1);
+        s.coat = coat_.eval_scalar(at);
         // The coat blurs what lies below.
-        float r4 = sqr(sqr(clamp(roughness_.eval_scalar(at), 0, 1)));
+        float r4 = sqr(sqr(roughness_.eval_scalar(at)));
         if (s.coat > 0 && coat_roughness_ > 0)
             r4 = lerp(s.coat, r4, std::min(1.0f, r4 + 2 * sqr(sqr(coat_roughness_))));
         s.alpha = std::sqrt(r4);

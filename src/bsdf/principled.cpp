@@ -269,7 +269,7 @@ public:
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
         const auto scalar = [&](const TextureRef& texture) {
-            return clamp(texture.eval_scalar(point.texture_point()), 0, 1);
+            return texture.eval_scalar(point.texture_point());
         };
         PrincipledLobe lobe{.base_color = base_color_.eval(point.texture_point()),
                             .surface_roughness = scalar(roughness_),
@@ -315,7 +315,7 @@ private:
 
     /// The index of refraction with the reflectance at normal incidence that is given; 1 reflects nothing.
     float own_eta(const SurfacePoint& point, bool transmits) const {
-        const float weight = clamp(specular_weight_.eval_scalar(point.texture_point()), 0, 1);
+        const float weight = specular_weight_.eval_scalar(point.texture_point());
         const float factor = weight * specular_color_.eval_scalar(point.texture_point());
         const float root = std::sqrt(std::min(sqr((eta_ - 1) / (eta_ + 1)) * factor, kLargestR0));
         const float eta = std::max((1 + root) / (1 - root), transmits ? kEtaOfClearGlass : 1.0f);

@@ -14,7 +14,7 @@ TextureRef ModelBuilder::texture(const Params& p, std::string_view name, Rgb fal
     for (const auto& c : p.object().children)
         if (c.name == name && plugins_.object(c.object).category == "texture") {
             const Texture* texture = make_texture(c.object);
-            return texture ? TextureRef(texture) : TextureRef(fallback);
+            return texture ? TextureRef(texture, hi) : TextureRef(fallback);
         }
     if (name.empty()) return TextureRef(fallback);
     const Rgb c = p.rgb(name, fallback);

@@ -61,17 +61,20 @@ constexpr bool is_grey(Rgb c) {
     return c.r == c.g && c.g == c.b;
 }
 
-/// A constant colour, or a texture, which must outlive the reference.
+/// A constant colour, or a texture, which must outlive the reference. The values of a texture with an upper bound are clamped
+/// to [0, hi]: a factor, an image of floating-point numbers or vertex colours may exceed it.
 class TextureRef {
 public:
     TextureRef() = default;
     TextureRef(Rgb constant)
         : constant_(constant), scalar_(is_grey(constant) ? constant.g : luminance(constant)) {}
-    explicit TextureRef(const Texture* texture) : texture_(texture) {}
+    explicit TextureRef(const Texture* texture, float hi = kInf) : texture_(texture), hi_(hi) {}
 
-    Rgb eval(const TexturePoint& at) const { return texture_ ? texture_->eval(at) : constant_; }
+    Rgb eval(const TexturePoint& at) const {
+        return texture_ ? bounded(texture_->eval(at)) : constant_;
+    }
     float eval_scalar(const TexturePoint& at) const {
-        return texture_ ? texture_->eval_scalar(at) : scalar_;
+        return texture_ ? bounded(texture_->eval_scalar(at)) : scalar_;
     }
     Vec2 gradient(const TexturePoint& at) const {
         return texture_ ? texture_->gradient(at) : Vec2();
@@ -80,9 +83,9 @@ public:
     template <class Point>
     requires requires(const Point& at) { TexturePoint(at.texture_point()); }
     Rgb eval(const Point& at) const {
-        return texture_ ? texture_->eval(at.texture_point()) : constant_;
+        return texture_ ? eval(at.texture_point()) : constant_;
     }
-    Rgb mean() const { return texture_ ? texture_->mean() : constant_; }
+    Rgb mean() const { return texture_ ? bounded(texture_->mean()) : constant_; }
     void resolution(int& width, int& height) const {
         width = height = 1;
         if (texture_) texture_->resolution(width, height);
@@ -91,9 +94,13 @@ public:
     const Texture* texture() const { return texture_; }
 
 private:
+    float bounded(float v) const { return hi_ < kInf ? clamp(v, 0, hi_) : v; }
+    Rgb bounded(Rgb c) const { return {bounded(c.r), bounded(c.g), bounded(c.b)}; }
+
     Rgb constant_;
     float scalar_ = 0;  ///< eval_scalar() of the constant.
     const Texture* texture_ = nullptr;
+    float hi_ = kInf;
 };
 
 /// Enlarges a grid so that it resolves all of these textures.
@@ -105,7 +112,7 @@ class TextureCache;
 class TextureContext {
 public:
     virtual ~TextureContext() = default;
-    /// A constant or nested texture; throws SceneError where a constant lies outside [0, hi].
+    /// A constant or nested texture; throws SceneError where a constant lies outside [0, hi], to which textures are clamped.
     virtual TextureRef texture(const Params& params, std::string_view name, Rgb fallback,
                                float hi = kInf) = 0;
     /// The scene's images; they outlive its textures.

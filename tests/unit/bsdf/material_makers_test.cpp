@@ -4,6 +4,7 @@
 
 #include "bsdf/ior.h"
 #include "color/metals.h"
+#include "lobe_tests.h"
 #include "test_materials.h"
 
 namespace etendue {
@@ -105,6 +106,49 @@ TEST(MaterialMakers, IndicesAreNumbersOrNames) {
               std::string::npos);
     EXPECT_NE(refusal("roughdielectric", {{"int_ior", 1.5}, {"ext_ior", 1.5}}).find("different"),
               std::string::npos);
+}
+
+/// What scatters between two directions at the only point of a surface.
+Rgb value(const Material& material, Vec3 wo, Vec3 wi) {
+    ComponentArena arena;
+    return material.bsdf(plane_point(wo), arena).eval(wo, wi, TransportMode::Radiance).f;
+}
+
+// A factor, an image of floating-point numbers or vertex colours may exceed the bound that constants are held to. Several
+// models divide by 1 minus a colour.
+TEST(MaterialMakers, TexturesAreClampedTo1WhereConstantsMustBe) {
+    const Vec3 wo = direction(50, 20), back = direction(150, 20);
+    int bounded = 0;
+    for (const MaterialEntry& entry : material_registry())
+        for (const ParamInfo& param : entry.info.params) {
+            const char *type = entry.info.name, *name = param.name;
+            if (param.kind != ParamKind::Texture ||
+                refusal(type, {{name, Rgb(1.01f)}}).find("too large") == std::string::npos)
+                continue;
+            for (const Values& others :
+                 {Values{}, Values{{"nonlinear", true}},
+                  Values{{"base_metalness", 1.0}, {"specular_roughness", 1.0}},
+                  Values{{"base_diffuse_roughness", 1.0}}, Values{{"transmission_weight", 1.0}}}) {
+                TestMaterials materials;
+                const auto textured = [&](float v) -> const Material* {
+                    FunctionTexture texture;
+                    texture.color = [v](Vec2) { return Rgb(v); };
+                    try {
+                        return &materials.make(type, others, {{name, materials.texture(texture)}});
+                    } catch (const SceneError&) {
+                        return nullptr;  // no parameter of the model
+                    }
+                };
+                const Material *at_bound = textured(1), *above = textured(1.7f);
+                if (!at_bound) continue;
+                ++bounded;
+                EXPECT_EQ(above->mean_albedo(), at_bound->mean_albedo()) << type << " " << name;
+                for (const Vec3 wi : {direction(30, 150), back})
+                    EXPECT_EQ(value(*above, wo, wi), value(*at_bound, wo, wi))
+                        << type << " " << name;
+            }
+        }
+    EXPECT_GT(bounded, 60);
 }
 
 }  // namespace

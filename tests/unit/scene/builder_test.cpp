@@ -84,6 +84,22 @@ TEST(SceneBuilder, UnknownTextureIsReplacedByTheDefault) {
     EXPECT_EQ(scene.shapes().at(0).material->mean_albedo(), Rgb(0.5f));
 }
 
+// A constant above 1 is refused.
+TEST(SceneBuilder, TexturesAreClampedToTheBoundOfTheirParameter) {
+    const auto scaled = [](const std::string& scale) {
+        return build(front_camera(4) +
+                     "<shape type=\"sphere\"><bsdf type=\"diffuse\"><texture type=\"scale\" "
+                     "name=\"reflectance\"><texture type=\"checkerboard\"/><rgb name=\"scale\" "
+                     "value=\"" +
+                     scale + "\"/></texture></bsdf></shape>")
+            .shapes()
+            .at(0)
+            .material->mean_albedo();
+    };
+    EXPECT_EQ(scaled("1, 2, 5").b, 1);
+    EXPECT_LT(scaled("1, 2, 5").g, 0.7f);
+}
+
 TEST(SceneBuilder, RefusesGroupsThatMultiply) {
     // Each group has the one before it twice: 2^25 instances.
     std::string groups = "<shape type=\"shapegroup\" id=\"g0\"><shape type=\"sphere\"/></shape>\n";
