@@ -292,19 +292,21 @@ void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& recor
 
 }  // namespace
 
-std::vector<ParamInfo> Guiding::params() {
-    return {
-        {"guide", ParamKind::String, "off",
-         "Learned directions for the walks: off, on, or auto (on, unless the training shows "
-         "that it gains too little). hp02 (experimental, for comparisons) guides eye walks "
-         "alone, by footprints of photons [Hey & Purgathofer 2002]."},
-        {"guide_walks", ParamKind::Int, "100000",
-         "Number of light walks, and of eye walks, that train the guide before the first pass. A "
-         "refit traces as many, before the first of passes 1, 4, 16, 64 … at which the image has "
-         "had 8, 64, 512 … times as many samples."},
-        {"guide_roulette", ParamKind::Bool, "true",
-         "Adjoint-driven Russian roulette of guided walks: by the contribution that earlier "
-         "walks had from the same place on. Has no effect if `guide` is off."}};
+std::vector<ParamInfo> Guiding::params(GuideRefits refits) {
+    const char* walks =
+        refits == GuideRefits::Never
+            ? "Number of light walks, and of eye walks, that train the guide before the first pass."
+            : "Number of light walks, and of eye walks, that train the guide before the first "
+              "pass. A refit traces as many, before the first of passes 1, 4, 16, 64 … at which "
+              "the image has had 8, 64, 512 … times as many samples.";
+    return {{"guide", ParamKind::String, "off",
+             "Learned directions for the walks: off, on, or auto (on, unless the training shows "
+             "that it gains too little). hp02 (experimental, for comparisons) guides eye walks "
+             "alone, by footprints of photons [Hey & Purgathofer 2002]."},
+            {"guide_walks", ParamKind::Int, "100000", walks},
+            {"guide_roulette", ParamKind::Bool, "true",
+             "Adjoint-driven Russian roulette of guided walks: by the contribution that earlier "
+             "walks had from the same place on. Has no effect if `guide` is off."}};
 }
 
 Guiding::Guiding(const IntegratorParams& p) {

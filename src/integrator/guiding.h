@@ -11,9 +11,11 @@ namespace etendue {
 /// Walks that a method guides. With pairs, each eye path meets the light paths of all pixels.
 enum class GuidedWalks { Eye, Light, Both, BothWithPairs };
 
+enum class GuideRefits : bool { Never, BetweenPasses };
+
 class Guiding {
 public:
-    static std::vector<ParamInfo> params();
+    static std::vector<ParamInfo> params(GuideRefits refits = GuideRefits::BetweenPasses);
     Guiding() = default;
     explicit Guiding(const IntegratorParams& params);
 

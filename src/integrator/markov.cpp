@@ -38,12 +38,12 @@ std::vector<ParamInfo> MarkovIntegrator::params() {
 }
 
 MarkovIntegrator::MarkovIntegrator(const IntegratorParams& p, const DepthOptions& depth,
-                                   StepWorth worth)
+                                   StepWorth worth, Guiding guiding)
     : options_{.groups = p.integer("groups", 2, 1024),
                .chains = p.integer("chains", 1, 1 << 20),
                .p_large = double(p.number("p_large", 0.01f, 1.0f)),
                .mutations = double(p.number("mutations", 0.0f, 1024.0f))},
-      paths_(depth, kShortest), worth_(worth),
+      paths_(depth, kShortest), worth_(worth), guiding_(std::move(guiding)),
       direct_({std::min(depth.max_depth, kShortest - 1), depth.rr_depth}, 1),
       pilot_paths_({depth.max_depth, std::min(depth.rr_depth, kPilotRoulette)}, kShortest),
       finding_paths_({depth.max_depth, std::min(depth.rr_depth, kFindingRoulette)}, kShortest) {
@@ -57,11 +57,16 @@ uint64_t MarkovIntegrator::whole_film_paths(const Scene& scene) {
                     uint64_t(std::llround(reached_region(scene.film(), scene.filter()).area())));
 }
 
+TechniqueCounts MarkovIntegrator::guided_counts(const Scene& scene) const {
+    // Of bidirectional path tracing alone; the counts of derived classes may depend on an earlier begin().
+    TechniqueCounts n = MarkovIntegrator::counts(scene, 0);
+    n.guide = guiding_.guide();
+    return n;
+}
+
 PrimarySample MarkovIntegrator::bidirectional_sample(const Scene& scene,
                                                      const Bidirectional& paths) const {
-    // The counts of bidirectional path tracing alone; those of derived classes may depend on an earlier begin().
-    const TechniqueCounts n = MarkovIntegrator::counts(scene, 0);
-    return [&paths, n](int, const SampleContext& c, Workspace& work) {
+    return [&paths, n = guided_counts(scene)](int, const SampleContext& c, Workspace& work) {
         add_bdpt_sample(paths, c, n, work);
     };
 }
@@ -93,6 +98,7 @@ void MarkovIntegrator::trace(const PassContext& pass) {
     const bool is_loaded = !loaded_.empty();
     if (!has_begun_) {
         if (!is_loaded) {
+            guiding_.train(pass, pilot_paths_.depth(), GuidedWalks::Both);
             const TechniqueCounts n = direct_counts(pass.scene, pass.light_paths);
             pilot_ = run_pilot(pass, bidirectional_sample(pass.scene, pilot_paths_),
                                [&](int, const SampleContext& c, Workspace& work) {
@@ -135,6 +141,7 @@ void MarkovIntegrator::save(LearnedState& to) const {
     const bool has_chains = has_begun_ || !loaded_.empty();
     to.put(has_chains);
     if (!has_chains) return;
+    guiding_.save(to);
     pilot_->save(to);
     if (!has_begun_) {
         to.put(loaded_);
@@ -149,6 +156,7 @@ void MarkovIntegrator::load(LearnedState& from) {
     bool has_chains = false;
     from.get(has_chains);
     if (!has_chains) return;
+    guiding_.load(from);
     pilot_.emplace();
     pilot_->load(from);
     from.get(loaded_);
@@ -178,6 +186,7 @@ std::vector<std::pair<std::string, double>> MarkovIntegrator::figures() const {
         {"later_samples", groups_->stats().later_samples},
         {"mutations_per_pixel", mutations_per_pixel()},
         {"longest_stay", groups_->stats().longest_stay}};
+    guiding_.add_figures(out);
     add_step_figures(groups_->stats(), space_->mutations(), kShortest, out);
     return out;
 }

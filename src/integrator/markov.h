@@ -58,7 +58,9 @@ protected:
         double correlation;  ///< Variance of a mean over mutations, relative to independent states.
         double cost;         ///< Time of a mutation, divided by that of a sample of direct light.
     };
-    MarkovIntegrator(const IntegratorParams& params, const DepthOptions& depth, StepWorth worth);
+    /// `guiding` must be given if the integrator has the parameter Guiding::params().
+    MarkovIntegrator(const IntegratorParams& params, const DepthOptions& depth, StepWorth worth,
+                     Guiding guiding = {});
 
     /// The space of states, and the parameters of its classes and pools (ChainOptions).
     struct Chains {
@@ -77,6 +79,8 @@ protected:
     /// From now on, paths_ tests joins that have a small part of the target of a state with a probability in proportion.
     void use_roulette(const FilmGeometry& film, const Pilot& pilot);
 
+    /// The counts of samples of bidirectional path tracing, whose walks are guided.
+    TechniqueCounts guided_counts(const Scene& scene) const;
     /// A sample of all techniques of `bdpt`, with the walks of `paths`.
     PrimarySample bidirectional_sample(const Scene& scene, const Bidirectional& paths) const;
     /// Samples of all techniques as states of the single paths of which they consist. Walks and joins have Russian roulette,
@@ -105,6 +109,7 @@ private:
     double mutations_per_pixel() const;
 
     StepWorth worth_;
+    Guiding guiding_;  ///< Trained once: all chains and samples have the same guide.
     Bidirectional direct_;
     Bidirectional pilot_paths_;  ///< With Russian roulette, even if the walks of chains have none.
     Bidirectional finding_paths_;  ///< Of samples_of_paths().

@@ -17,7 +17,8 @@ namespace {
 class MltIntegrator final : public MarkovIntegrator {
 public:
     explicit MltIntegrator(const IntegratorParams& p)
-        : MarkovIntegrator(p, DepthOptions::without_roulette(p), {.correlation = 10, .cost = 1.25}),
+        : MarkovIntegrator(p, DepthOptions::without_roulette(p), {.correlation = 10, .cost = 1.25},
+                           Guiding(p)),
           user_paths_(p.string("user_paths")),
           user_ratio_(double(p.number("user_ratio", 0.01f, 100.0f))) {}
 
@@ -68,7 +69,8 @@ IntegratorEntry mlt_entry() {
                        "are mixed with bidirectional mutations."},
                       {"user_ratio", ParamKind::Float, "1",
                        "Number of proposals near user paths for each bidirectional mutation, and "
-                       "of large steps that follow them for each other one, 0.01 to 100."}}})},
+                       "of large steps that follow them for each other one, 0.01 to 100."}},
+                     Guiding::params(GuideRefits::Never)})},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<MltIntegrator>(p);
             }};

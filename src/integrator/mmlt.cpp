@@ -110,12 +110,13 @@ private:
 class MmltIntegrator final : public MarkovIntegrator {
 public:
     explicit MmltIntegrator(const IntegratorParams& p)
-        : MarkovIntegrator(p, DepthOptions::without_roulette(p), {.correlation = 15, .cost = 1.25}),
+        : MarkovIntegrator(p, DepthOptions::without_roulette(p), {.correlation = 15, .cost = 1.25},
+                           Guiding(p)),
           lengths_(p.integer("lengths", 1, 64)) {}
 
 protected:
     Chains begin(const PassContext& pass, const Pilot& pilot) override {
-        const TechniqueCounts n = counts(pass.scene, 0);
+        const TechniqueCounts n = guided_counts(pass.scene);
         const int longest = paths_.max_depth();
         const int classes = std::min(lengths_, longest - kShortest + 1);
         const auto choice = std::make_shared<PathChoice>(pass.scene, kShortest, classes, longest,
@@ -181,7 +182,8 @@ IntegratorEntry mmlt_entry() {
                      MarkovIntegrator::params(),
                      {{"lengths", ParamKind::Int, "10",
                        "Number of classes of path lengths, 1 to 64, from three edges on; each has "
-                       "its own chains. The last class contains all longer paths."}}})},
+                       "its own chains. The last class contains all longer paths."}},
+                     Guiding::params(GuideRefits::Never)})},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<MmltIntegrator>(p);
             }};

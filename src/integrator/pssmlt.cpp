@@ -14,7 +14,7 @@ namespace {
 class PssmltIntegrator final : public MarkovIntegrator {
 public:
     explicit PssmltIntegrator(const IntegratorParams& p)
-        : MarkovIntegrator(p, DepthOptions::from(p), {.correlation = 10, .cost = 4}) {}
+        : MarkovIntegrator(p, DepthOptions::from(p), {.correlation = 10, .cost = 4}, Guiding(p)) {}
 
 protected:
     Chains begin(const PassContext& pass, const Pilot& pilot) override {
@@ -33,7 +33,8 @@ IntegratorEntry pssmlt_entry() {
     return {{"integrator", "pssmlt",
              "Metropolis light transport in the primary sample space of bidirectional path "
              "tracing. Unbiased.",
-             concat({sub_path_params(), MarkovIntegrator::params()})},
+             concat({sub_path_params(), MarkovIntegrator::params(),
+                     Guiding::params(GuideRefits::Never)})},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<PssmltIntegrator>(p);
             }};

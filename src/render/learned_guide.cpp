@@ -15,13 +15,16 @@
 namespace etendue {
 namespace {
 
-constexpr std::array<Choice<GuidedWalks>, 7> kMethods{{{"path", GuidedWalks::Eye},
-                                                       {"light", GuidedWalks::Light},
-                                                       {"bdpt", GuidedWalks::Both},
-                                                       {"vcm", GuidedWalks::Both},
-                                                       {"upg", GuidedWalks::BothWithPairs},
-                                                       {"upg+bdpt", GuidedWalks::BothWithPairs},
-                                                       {"pcbpt", GuidedWalks::Both}}};
+constexpr std::array<Choice<GuidedWalks>, 10> kMethods{{{"path", GuidedWalks::Eye},
+                                                        {"light", GuidedWalks::Light},
+                                                        {"bdpt", GuidedWalks::Both},
+                                                        {"vcm", GuidedWalks::Both},
+                                                        {"upg", GuidedWalks::BothWithPairs},
+                                                        {"upg+bdpt", GuidedWalks::BothWithPairs},
+                                                        {"pcbpt", GuidedWalks::Both},
+                                                        {"pssmlt", GuidedWalks::Both},
+                                                        {"mmlt", GuidedWalks::Both},
+                                                        {"mlt", GuidedWalks::Both}}};
 
 GuidedWalks guided_walks(const std::string& method) {
     std::vector<std::string> names;

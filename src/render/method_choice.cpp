@@ -69,7 +69,10 @@ struct Contender {
     std::string name() const { return IntegratorSpec::parse(method()).name; }
     /// Whether eye paths meet the light paths of all pixels, of which there are few in pilots.
     bool reuses_light_paths() const { return method().starts_with("upg") || method() == "vcm"; }
+    bool has_chains() const { return method().ends_with("mlt"); }
+    /// Pilots with chains are too few to tell what a guide gains there.
     bool can_have_guide() const {
+        if (has_chains()) return false;
         const std::vector<ParamInfo>& params = integrator_entry(name()).info.params;
         return !guide && std::any_of(params.begin(), params.end(), [](const ParamInfo& p) {
             return std::string_view(p.name) == "guide";

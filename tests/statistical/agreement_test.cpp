@@ -194,6 +194,22 @@ TEST_P(ChainAgreement, WithPathTracing) {
     }
 }
 
+/// A guide that has learned, and one that knows nothing and is sure of it.
+class GuidedChainAgreement : public Agreement {};
+
+TEST_P(GuidedChainAgreement, WithPathTracing) {
+    const AgreementCase& c = GetParam();
+    const Scene scene = build(c.xml);
+    const Tiles path = indirect_tiles(scene, "path", 2 * c.passes, 1);
+    for (const char* guide : {"guide=on,guide_walks=4000", "guide=random"})
+        for (const char* method : {"pssmlt:chains=16", "mmlt:chains=48", "mlt:chains=48"}) {
+            const uint64_t passes = std::min<uint64_t>(512, c.passes);
+            const std::string chains = fmt::format("{},groups={},{}", method, passes, guide);
+            expect_same_image(indirect_tiles(scene, chains, passes, 6), path, 2 * c.resolution,
+                              chains + " against path");
+        }
+}
+
 /// Every method with a guide, of `passes` times `factor` passes: a guide that has learned, and one that knows nothing
 /// and is sure of it.
 class GuidedAgreement : public Agreement {
@@ -337,6 +353,10 @@ INSTANTIATE_TEST_SUITE_P(Quick, Agreement, ::testing::ValuesIn(cases()), kName);
 INSTANTIATE_TEST_SUITE_P(Quick, SpecularAgreement, ::testing::ValuesIn(specular_cases()), kName);
 INSTANTIATE_TEST_SUITE_P(Quick, ChainAgreement,
                          ::testing::ValuesIn(cases({"thinlens", "mask", "medium"})), kName);
+INSTANTIATE_TEST_SUITE_P(Quick, GuidedChainAgreement, ::testing::ValuesIn(cases({"lantern"})),
+                         kName);
+INSTANTIATE_TEST_SUITE_P(Long, GuidedChainAgreement, ::testing::ValuesIn(cases({"thinlens"})),
+                         kName);
 INSTANTIATE_TEST_SUITE_P(Long, ChainAgreement, ::testing::ValuesIn(cases()), kName);
 INSTANTIATE_TEST_SUITE_P(Long, LongAgreement, ::testing::ValuesIn(cases()), kName);
 INSTANTIATE_TEST_SUITE_P(Quick, GuidedAgreement,
