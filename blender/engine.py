@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 
 from .camera import resolution
+from .denoising import prepare
 from .images import with_copies
 from .report import Refused
 from .scene import SceneReader
@@ -20,6 +21,8 @@ from .viewport import Viewport
 
 PASSES = (("Normal", 3, "XYZ", "VECTOR"), ("Depth", 1, "Z", "VALUE"), ("Albedo", 3, "RGB", "COLOR"))
 """Passes beside Combined: name, channels, their names, and type."""
+DENOISED = "Denoised"
+"""One more, if the setting says so."""
 _FAR = 1e10
 """The depth where there is no surface, as in Cycles."""
 
@@ -37,6 +40,8 @@ class EtendueEngine(bpy.types.RenderEngine):
 
     def update_render_passes(self, scene: Any = None, renderlayer: Any = None) -> None:
         self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")
+        if scene is not None and scene.etendue.denoise:
+            self.register_pass(scene, renderlayer, DENOISED, 4, "RGBA", "COLOR")
         for name, channels, letters, kind in PASSES:
             self.register_pass(scene, renderlayer, name, channels, letters, kind)
 
@@ -74,6 +79,9 @@ class EtendueEngine(bpy.types.RenderEngine):
         self.update_stats("", "Building the scene")
         built, scene = et.load_dict(description).build(), depsgraph.scene
         settings = scene.etendue
+        if settings.denoise:
+            prepare()
+            self.add_pass(DENOISED, 4, "RGBA", layer=depsgraph.view_layer.name)
         result = self.begin_result(0, 0, built.width, built.height, layer=depsgraph.view_layer.name)
         newest: list[tuple[et.Progress, np.ndarray | None]] = []
 
@@ -93,6 +101,7 @@ class EtendueEngine(bpy.types.RenderEngine):
             # On a thread of its own, so that cancelling need not wait for the end of a pass.
             with et.start(
                 built, integrator_text(settings), spp=settings.samples, time=settings.time or None, seed=settings.seed,
+                filter_mode="sample" if settings.denoise else "spread",
                 threads=scene.render.threads if scene.render.threads_mode == "FIXED" else 0,
                 aovs=[name.lower() for name, *_ in PASSES], callback=keep,
             ) as job:
@@ -111,6 +120,8 @@ class EtendueEngine(bpy.types.RenderEngine):
                 return
             raise
         _fill(result, "Combined", _with_alpha(image.image))
+        if settings.denoise:
+            _fill(result, DENOISED, _with_alpha(image.denoised()))
         _fill(result, "Normal", image.aov["normal"])
         _fill(result, "Albedo", image.aov["albedo"])
         _fill(result, "Depth", _depth(image.aov["depth"][..., :1], description["sensor"], resolution(scene.render)))

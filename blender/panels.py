@@ -40,7 +40,7 @@ class EtendueSamplingPanel(_RenderPanel, bpy.types.Panel):
         if not integrators():
             layout.label(text="The Python package etendue is missing", icon="ERROR")
             return
-        for name in ("samples", "time", "seed", "depth", "preview_samples"):
+        for name in ("samples", "time", "seed", "depth", "denoise", "preview_samples"):
             layout.prop(settings, name)
         layout.operator(ExportEtendueScene.bl_idname)
 

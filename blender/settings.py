@@ -86,6 +86,7 @@ def register() -> None:
                               default=0, min=0, subtype="TIME_ABSOLUTE"),
         "seed": IntProperty(name="Seed", description="Seed of all random numbers", default=0, min=0),
         "depth": IntProperty(name="Depth", description="Number of edges of the longest paths; -1: no limit", default=-1, min=-1),
+        "denoise": BoolProperty(name="Denoise", description="Adds the pass Denoised, by Intel Open Image Denoise; Combined keeps its noise"),
         "preview_samples": IntProperty(name="Viewport", description="Samples per pixel in the viewport", default=16, min=1),
         **{key: PointerProperty(type=group) for key, group in _groups.items()},
     }

@@ -1,6 +1,7 @@
 """Skips these tests by name where bpy or etendue is missing, and registers the add-on once."""
 
 import importlib.util
+import os
 import sys
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 
 _ADDON = Path(__file__).parents[2] / "blender"
 _MISSING = [name for name in ("bpy", "etendue") if importlib.util.find_spec(name) is None]
+_STATUS = pytest.StashKey[int]()
 
 if not _MISSING:
     spec = importlib.util.spec_from_file_location(
@@ -21,6 +23,18 @@ def pytest_collection_modifyitems(items):
     if _MISSING:
         for item in items:
             item.add_marker(pytest.mark.skip(reason=f"the Python package {_MISSING[0]} is missing"))
+
+
+def pytest_sessionfinish(session, exitstatus):
+    session.config.stash[_STATUS] = int(exitstatus)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config):
+    """Ends the process without the destructors of Blender 4.5, one of which waits for ever."""
+    sys.stdout.flush()
+    if "bpy" in sys.modules:
+        os._exit(config.stash.get(_STATUS, 1))
 
 
 @pytest.fixture

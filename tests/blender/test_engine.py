@@ -31,28 +31,30 @@ def furnished(studio):
     studio.world((0.1, 0.2, 0.3))
 
 
-def test_passes(studio):
-    material, _, _ = studio.material("ShaderNodeBsdfDiffuse", Color=(0.8, 0.4, 0.2))
-    studio.plane(3, material)
-    studio.world()
-    layer = bpy.context.view_layer
-    layer.use_pass_normal = layer.use_pass_z = True
+def passes(monkeypatch):
+    """The passes of renderings to come, by name, as Blender has them."""
     seen = {}
     engine = sys.modules["etendue_addon.engine"]
-    original = engine._fill
 
-    def fill(result, name, image):
+    def fill(result, name, image, original=engine._fill):
         original(result, name, image)
         found = result.layers[0].passes.find_by_name(name, "")
         values = np.zeros(image.size, np.float32)
         found.rect.foreach_get(values)
         seen[name] = values.reshape(image.shape)[::-1]
 
-    engine._fill = fill
-    try:
-        combined = studio.render()
-    finally:
-        engine._fill = original
+    monkeypatch.setattr(engine, "_fill", fill)
+    return seen
+
+
+def test_passes(studio, monkeypatch):
+    material, _, _ = studio.material("ShaderNodeBsdfDiffuse", Color=(0.8, 0.4, 0.2))
+    studio.plane(3, material)
+    studio.world()
+    layer = bpy.context.view_layer
+    layer.use_pass_normal = layer.use_pass_z = True
+    seen = passes(monkeypatch)
+    combined = studio.render()
     assert np.allclose(seen["Combined"][..., :3], combined) and (seen["Combined"][..., 3] == 1).all()
     assert seen["Normal"][24, 32] == pytest.approx([0, 0, 1], abs=1e-4)
     assert seen["Albedo"][24, 32] == pytest.approx([0.8, 0.4, 0.2], abs=1e-4)
@@ -66,6 +68,36 @@ def test_passes(studio):
     hit = ray * (2 / -ray.z)
     assert abs(hit.length / hit.dot(axis) - 1) > 0.02
     assert seen["Depth"][36, 16] == pytest.approx(hit.dot(axis), rel=0.01)
+
+
+def test_the_denoised_image_is_a_pass_of_its_own(studio, monkeypatch):
+    furnished(studio)
+    settings = studio.scene.etendue
+    settings.integrator, settings.samples = "bdpt", 256
+    reference = studio.render()
+    settings.samples, settings.denoise = 4, True
+    seen = passes(monkeypatch)
+    noisy = studio.render()
+    denoised = seen["Denoised"][..., :3]
+    error = [np.abs(image - reference).mean() for image in (noisy, denoised)]
+    assert 0 < error[1] < 0.7 * error[0]
+
+    # Files have it, too.
+    image, file = studio.scene.render.image_settings, studio.folder / "passes.exr"
+    if hasattr(image, "media_type"):  # Blender 5
+        image.media_type = "MULTI_LAYER_IMAGE"
+    image.file_format, studio.scene.render.filepath = "OPEN_EXR_MULTILAYER", str(file)
+    for settings.denoise in (True, False):
+        bpy.ops.render.render(write_still=True)
+        assert (b"ViewLayer.Denoised.R" in file.read_bytes()) == settings.denoise
+
+
+def test_denoising_without_a_library_is_an_error(studio, monkeypatch):
+    furnished(studio)
+    monkeypatch.setenv("ETENDUE_OIDN", str(studio.folder))
+    studio.scene.etendue.denoise = True
+    with pytest.raises(RuntimeError, match="OIDN|denoise"):
+        studio.render()
 
 
 def test_renderings_can_be_cancelled(studio, monkeypatch):

@@ -71,6 +71,8 @@ def test_nodes_reflect_what_they_do_in_cycles(studio, name):
         node.distribution = distribution
     studio.sphere(material)
     lit(studio, light)
+    # Of 16 samples a single bright one, as of rough glass in Blender 4.5, would change the mean by 5 %.
+    studio.scene.cycles.samples = 64
     assert studio.ratio(SPHERE) == pytest.approx(expected, abs=0.02)
 
 
