@@ -118,8 +118,8 @@ float Microfacet::max_D(float theta) const {
     const float sin2 = theta > 0 ? sqr(std::sin(theta)) : 0.0f, cos2 = 1 - sin2;
     const float max_alpha2 = sqr(std::fmax(alpha_x_, alpha_y_)), norm = kPi * alpha_x_ * alpha_y_;
     if (kind_ == Kind::Ggx) {
-        // Monotone for α ≤ 1 only; beyond that the peak lies at the horizon.
-        return max_alpha2 > 1 ? kInf : 1 / (norm * sqr(cos2 + sin2 / max_alpha2));
+        // It falls with θ for α ≤ 1; beyond that the peak lies at the horizon.
+        return max_alpha2 > 1 ? sqr(max_alpha2) / norm : 1 / (norm * sqr(cos2 + sin2 / max_alpha2));
     }
     // exp(-tan²θ/α²)/cos⁴θ has its maximum at tan²θ = 2α² - 1.
     const float tan2 = std::fmax(sin2 / cos2, 2 * max_alpha2 - 1);

@@ -14,7 +14,7 @@
 //   coat_weight (0), coat_color (1), coat_roughness (0), coat_ior (1.6)      clear coat over all of these, and its
 //                                       transmittance at normal incidence, down and up; numbers but for the weight
 //   fuzz_weight (0), fuzz_color (1), fuzz_roughness (0.5)      fibres over all; numbers but for the weight
-//   thin_walled (false)                 glass is a smooth pane; the surface is seen from both sides
+//   thin_walled (false)                 glass is a smooth pane without coat and fuzz; the surface is seen from both sides
 // Names, mixture and roughness are those of [OpenPBR 2024]. What differs:
 //   - Layers. OpenPBR multiplies what lies below a layer by 1 − E(o), E being the layer's albedo for the direction of view.
 //     Here all is reciprocal, so that methods that trace light find the same image. A diffuse base below a dielectric has
@@ -24,11 +24,13 @@
 //     F̄² Ē / (1 − F̄ (1 − Ē)). Those of glass are reflected and transmitted in shares that keep them adjoint.
 //   - Metal has F82-tint [Kutz et al. 2021], the diffuse base f_FON with the multiple scattering of EON
 //     [Portsmouth et al. 2025], fuzz the cloth of [Estevez & Kulla 2017].
-//   - The coat does not darken its base by reflections between them, and there is no subsurface scattering, dispersion, thin
-//     film or emission.
-// A material with transmission has its opaque part on both sides; other ones reflect on the front alone.
-// The albedo of white surfaces is 1 within 0.5 %, for roughnesses from 0 to 1; of those with both coat and fuzz it is 0.985
-// to 1.006, since the fuzz is taken to lie on the slab alone.
+//   - specular_weight does not scale the reflection of metal.
+//   - The coat is isotropic and does not darken its base by reflections between them, and there is no subsurface scattering,
+//     dispersion, thin film or emission.
+// A thin-walled material, and one with transmission, has its opaque part on both sides; other ones reflect on the front alone.
+// The albedo of white surfaces is 1 within 0.5 %, for roughnesses from 0 to 1; within 6° of the horizon it is 1 within 1.4 % where
+// the roughness is a texture. Of surfaces with both coat and fuzz it is 0.985 to 1.006, since the fuzz is taken to lie on the
+// slab alone.
 
 #include "bsdf/openpbr.h"
 
@@ -83,8 +85,9 @@ OpenPbrLobe::End OpenPbrLobe::end(Vec3 w) const {
     e.row = table->row(alpha(), eta, w);
     e.place = CosineNodes::place(e.cos);
     const bool is_above = w.z > 0;
-    if (slab == OpenPbrSlab::Opaque && has_smooth_facets())
-        e.base = fresnel_dielectric(e.cos, eta).R;
+    // Smooth facets lose nothing, and the table of a textured roughness is interpolated towards rough ones.
+    if (has_smooth_facets())
+        e.base = slab == OpenPbrSlab::Opaque ? fresnel_dielectric(e.cos, eta).R : 0.0f;
     else
         e.base =
             table->at(is_above ? OpenPbrTable::kBase : OpenPbrTable::kBaseBelow, e.row, e.place);
@@ -375,8 +378,8 @@ float OpenPbrLobe::max_pdf(Vec3 wo, const DirectionCone& c) const {
 }
 
 Rgb OpenPbrLobe::albedo_estimate() const {
-    const float F = fresnel_dielectric(1, eta).R;
     if (slab == OpenPbrSlab::Metal) return color;
+    const float F = fresnel_dielectric(1, eta).R;
     return tint * F + color * (1 - F);
 }
 
@@ -442,7 +445,8 @@ public:
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
         const TexturePoint at = point.texture_point();
-        const float metal = metalness_.eval_scalar(at), transmitting = transmission_.eval_scalar(at),
+        const float metal = metalness_.eval_scalar(at),
+                    transmitting = transmission_.eval_scalar(at),
                     glass = (1 - metal) * transmitting, opaque = (1 - metal) * (1 - transmitting);
         const Surface s = surface(at);
         const Vec2 alphas = constants_.alphas(s.alpha);
@@ -457,7 +461,7 @@ public:
                          .slab = OpenPbrSlab::Opaque,
                          .table = nullptr};
         const Frame reflecting =
-            is_transmissive() && !sees_front(point, frame) ? frame.flipped() : frame;
+            is_two_sided() && !sees_front(point, frame) ? frame.flipped() : frame;
         const auto add = [&](const Frame& f, OpenPbrSlab slab, float share) {
             if (!(share > 0)) return;
             lobe.slab = slab;
@@ -475,6 +479,7 @@ public:
             add(frame, OpenPbrSlab::Glass, glass);
     }
     bool is_transmissive() const override { return may_be(transmission_); }
+    bool is_two_sided() const override { return is_transmissive() || is_thin_; }
     bool may_be_smooth() const override {
         return !roughness_.is_constant() ||
                sqr(roughness_.eval_scalar(Vec2())) > Microfacet::kMinAlpha || may_be(coat_) ||
@@ -519,10 +524,12 @@ private:
         s.eta = factor == 1 ? ior_ : ior_ < 1 ? (1 - root) / (1 + root) : (1 + root) / (1 - root);
         s.coat = coat_.eval_scalar(at);
         // The coat blurs what lies below.
-        float r4 = sqr(sqr(roughness_.eval_scalar(at)));
-        if (s.coat > 0 && coat_roughness_ > 0)
-            r4 = lerp(s.coat, r4, std::min(1.0f, r4 + 2 * sqr(sqr(coat_roughness_))));
-        s.alpha = std::sqrt(r4);
+        float r = roughness_.eval_scalar(at);
+        if (s.coat > 0 && coat_roughness_ > 0) {
+            const float below = sqr(sqr(r)) + 2 * sqr(sqr(coat_roughness_));
+            r = lerp(s.coat, r, std::pow(std::min(1.0f, below), 0.25f));
+        }
+        s.alpha = sqr(r);
         return s;
     }
 
@@ -572,7 +579,9 @@ MaterialEntry openpbr_entry() {
           {"fuzz_roughness", ParamKind::Float, "0.5",
            "Roughness of the fuzz, in [0, 1]: lower values brighten the edges."},
           {"thin_walled", ParamKind::Bool, "false",
-           "Whether transmission is that of a clear pane instead of a solid."}}},
+           "Whether the surface is thin: seen from both sides, with the transmission of a clear "
+           "pane without roughness, "
+           "coat and fuzz."}}},
         make_material<OpenPbr>};
 }
 

@@ -335,6 +335,7 @@ std::shared_ptr<SharedOpenPbrTable> SharedOpenPbrTable::of(OpenPbrSlab slab,
     static std::map<std::pair<OpenPbrSlab, OpenPbrConstants>, std::weak_ptr<SharedOpenPbrTable>>
         all;
     const std::lock_guard lock(mutex);
+    std::erase_if(all, [](const auto& known) { return known.second.expired(); });
     std::weak_ptr<SharedOpenPbrTable>& known = all[{slab, constants}];
     std::shared_ptr<SharedOpenPbrTable> shared = known.lock();
     if (!shared) known = shared = std::make_shared<SharedOpenPbrTable>(slab, constants);

@@ -49,6 +49,7 @@ const Values kMetal{{"base_metalness", 1.0}}, kGlass{{"transmission_weight", 1.0
 const Values kCoat{{"coat_weight", 1.0}, {"coat_roughness", 0.3}},
     kSmoothCoat{{"coat_weight", 0.7}, {"coat_ior", 1.8}},
     kFuzz{{"fuzz_weight", 1.0}, {"fuzz_roughness", 0.3}};
+const Values kBrushed{{"specular_roughness_anisotropy", 0.7}};
 const Values kColors{{"base_color", Rgb(0.8f, 0.4f, 0.2f)},
                      {"specular_color", Rgb(0.9f, 1, 0.5f)},
                      {"transmission_color", Rgb(0.5f, 0.9f, 0.7f)}};
@@ -63,7 +64,6 @@ struct Named {
 };
 /// Each slab and layer, in colours.
 std::vector<Named> all_lobes() {
-    const Values brushed{{"specular_roughness_anisotropy", 0.7}};
     const Values layers{{"coat_weight", 0.8},
                         {"coat_roughness", 0.2},
                         {"coat_color", Rgb(0.9f, 0.7f, 0.5f)},
@@ -74,12 +74,14 @@ std::vector<Named> all_lobes() {
             {"smooth opaque", kColors + rough(0)},
             {"dull", kColors + Values{{"specular_weight", 0.0}}},
             {"metal", kColors + kMetal + rough(0.5)},
-            {"brushed metal", kColors + kMetal + rough(0.6) + brushed},
+            {"brushed metal", kColors + kMetal + rough(0.6) + kBrushed},
             {"smooth metal under a rough coat", kColors + kMetal + rough(0) + kCoat},
             {"metal under a smooth coat", kColors + kMetal + rough(0.7) + kSmoothCoat},
             {"glass", kColors + kGlass + rough(0.4)},
             {"rough glass", kColors + kGlass + rough(0.9)},
-            {"brushed glass", kColors + kGlass + rough(0.6) + brushed},
+            {"brushed metal of any slope", kMetal + rough(1) + kBrushed},
+            {"dull brushed dielectric", rough(1) + kBrushed + Values{{"specular_color", Rgb(0)}}},
+            {"brushed glass", kColors + kGlass + rough(0.6) + kBrushed},
             {"air in water", kColors + kGlass + rough(0.5) + Values{{"specular_ior", 0.75}}},
             {"coated glass", kColors + kGlass + rough(0.5) + layers},
             {"cloth", kColors + kFuzz},
@@ -151,8 +153,7 @@ struct Furnace {
 
 class OpenPbrFurnace : public ::testing::TestWithParam<Furnace> {};
 
-// In a white furnace, a white surface is invisible. At 1.1° from the horizon, nodes of the tables are far apart for some
-// roughnesses.
+// In a white furnace, a white surface is invisible.
 TEST_P(OpenPbrFurnace, IsClosedForWhiteSurfaces) {
     const auto& [name, values, above, below] = GetParam();
     for (const double r : {0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.8, 1.0}) {
@@ -179,6 +180,8 @@ INSTANTIATE_TEST_SUITE_P(
                       Furnace{"SmoothlyCoatedMetal", kMetal + kSmoothCoat},
                       Furnace{"SmoothlyCoatedGlass", kGlass + kSmoothCoat},
                       Furnace{"FuzzyMetal", kMetal + kFuzz}, Furnace{"FuzzyOpaque", kFuzz},
+                      Furnace{"FuzzyGlass", kGlass + kFuzz}, Furnace{"BrushedOpaque", kBrushed},
+                      Furnace{"BrushedGlass", kGlass + kBrushed},
                       // The fuzz is taken to be over the slab alone.
                       Furnace{"All", kCoat + kFuzz, 0.006, 0.015}),
     [](const auto& tested) { return tested.param.name; });
@@ -212,6 +215,80 @@ TEST(OpenPbr, TexturedRoughnessAndReflectanceAreClosed) {
                     EXPECT_NEAR(albedo(lobe, {std::sqrt(1 - sqr(cos)), 0, cos}), 1, 0.005)
                         << "roughness " << r << ", weight " << weight << ", cosine " << cos;
             }
+    }
+}
+
+// Nearer to the horizon, albedos change faster with the roughness than between rows.
+TEST(OpenPbr, TexturedRoughnessIsNearlyClosedAtTheHorizon) {
+    float r = 0;
+    Made made(kWhite + kMetal, [&](TestMaterials& m) {
+        FunctionTexture roughness;
+        roughness.color = [&](Vec2) { return Rgb(r); };
+        return Children{{"specular_roughness", m.texture(roughness)}};
+    });
+    for (const float value : {0.03f, 0.06f, 0.1f, 0.3f, 0.7f})
+        for (const float cos : {0.05f, 0.02f, 0.01f}) {
+            r = value;
+            EXPECT_NEAR(albedo(made.lobe(), {std::sqrt(1 - sqr(cos)), 0, cos}), 1, 0.014)
+                << "roughness " << r << ", cosine " << cos;
+        }
+}
+
+// Of a texture, too: then its table is interpolated towards rough facets.
+TEST(OpenPbr, SmoothFacetsScatterNothingButDeltaEvents) {
+    for (const Values& slab : {kGlass, kMetal, kGlass + Values{{"specular_ior", 0.75}}}) {
+        Made made(kWhite + slab, [&](TestMaterials& m) {
+            FunctionTexture roughness;
+            roughness.color = [](Vec2) { return Rgb(2 / 255.0f); };
+            return Children{{"specular_roughness", m.texture(roughness)}};
+        });
+        const OpenPbrLobe lobe = made.lobe();
+        ASSERT_FALSE(lobe.has_smooth());
+        for (const float cos : {1.0f, 0.1f, 0.01f, 0.001f, -0.01f}) {
+            if (cos < 0 && lobe.slab != OpenPbrSlab::Glass) continue;
+            const Vec3 wo{std::sqrt(1 - sqr(cos)), 0, cos};
+            double sum = 0;
+            for (const bool transmits : {false, true})
+                if (const auto s = lobe.delta_event(wo, transmits)) sum += double(s->pdf);
+            EXPECT_NEAR(sum, 1, 1e-6) << cos;
+            constexpr int kSamples = 1000;
+            int delta = 0;
+            for (int i = 0; i < kSamples; ++i)
+                if (const auto s = lobe.sample(wo, (float(i) + 0.5f) / kSamples, {0.3f, 0.7f}))
+                    delta += s->is_delta;
+            EXPECT_EQ(delta, kSamples) << cos;
+        }
+    }
+}
+
+// The reference mixes roughnesses, not their fourth powers, so that a thin coat hardly blurs a mirror.
+TEST(OpenPbr, ACoatRoughensWhatLiesBelowByItsWeight) {
+    for (const double base : {0.0, 0.2, 0.9})
+        for (const double coat : {0.0, 0.3, 0.8})
+            for (const double weight : {0.1, 0.5, 1.0}) {
+                const double below =
+                    std::pow(std::min(1.0, std::pow(base, 4) + 2 * std::pow(coat, 4)), 0.25);
+                Made made(kMetal + rough(base) +
+                          Values{{"coat_weight", weight}, {"coat_roughness", coat}});
+                EXPECT_NEAR(std::sqrt(double(made.lobe().alpha_x)), base + weight * (below - base),
+                            1e-5)
+                    << base << " " << coat << " " << weight;
+            }
+}
+
+TEST(OpenPbr, ThinWalledSurfacesReflectOnBothSides) {
+    for (const double transmission : {0.0, 0.5}) {
+        Made thin(Values{{"thin_walled", true}, {"transmission_weight", transmission}});
+        EXPECT_TRUE((*thin).is_two_sided());
+        const auto reflected = [&](Vec3 wo) {
+            ComponentArena arena;
+            return (*thin)
+                .bsdf(plane_point(wo), arena)
+                .eval(wo, {-wo.x, 0, wo.z}, TransportMode::Radiance)
+                .f.g;
+        };
+        EXPECT_GT(reflected(direction(30, 0)), 0.02f);
+        EXPECT_EQ(reflected(direction(30, 0)), reflected(direction(150, 0)));
     }
 }
 
@@ -257,6 +334,26 @@ TEST(OpenPbr, NeverGainsEnergy) {
             for (const int channel : {0, 2})
                 EXPECT_LE(albedo(made.lobe(), wo, channel), 1.005) << "set " << i << describe(wo);
     }
+}
+
+// A metal of reflectance above 1 would gain without bound, or reflect less than no light.
+TEST(OpenPbr, TexturesAbove1NeitherGainNorTurnNegative) {
+    for (const Values& slab : {kMetal, Values{}, kGlass})
+        for (const float color : {1.2f, 1.5f, 1.8f, 4.0f})
+            for (const double r : {0.3, 0.7, 1.0}) {
+                Made made(slab + rough(r), [&](TestMaterials& m) {
+                    FunctionTexture bright;
+                    bright.color = [color](Vec2) { return Rgb(color); };
+                    return Children{{"base_color", m.texture(bright)},
+                                    {"transmission_color", m.texture(bright)}};
+                });
+                const OpenPbrLobe lobe = made.lobe();
+                for (const Vec3 wo : {direction(10, 0), direction(45, 0), direction(80, 0)}) {
+                    EXPECT_LE(albedo(lobe, wo), 1.005) << color << " " << r << describe(wo);
+                    for (const Vec3 wi : test_directions_both_sides())
+                        EXPECT_GE(lobe.eval(wo, wi).f.r, 0) << color << " " << r << describe(wo);
+                }
+            }
 }
 
 TEST(OpenPbr, WithoutReflectionIsDiffuse) {
