@@ -232,11 +232,14 @@ def test_results_older_than_their_methods_are_found(tmp_path: Path, results: typ
     page.write_text(generated)
     # Files.
     assert "speed of 2026-11-30 has no files" in problems(("speed.json",), speed=good | {"files": {}})
-    (figures / "by-hand.svg").write_text("")
-    assert "docs/figures/by-hand.svg is not of a part that was made" in problems()
-    assert problems(("by-hand.svg",)) == ""
-    (figures / "by-hand.svg").unlink()
-    assert "docs/figures/by-hand.svg is missing" in problems(("by-hand.svg",))
+    (figures / "speed-by-hand.json").write_text("")
+    assert "docs/figures/speed-by-hand.json was not written by its part" in problems()
+    assert problems(("speed-by-hand.json",)) == ""
+    (figures / "speed-by-hand.json").unlink()
+    assert "docs/figures/speed-by-hand.json is missing" in problems(("speed-by-hand.json",))
+    (figures / "drawn.svg").write_text("")
+    assert results.check() == 1  # of the list that lacks the file
+    assert "no part writes drawn.svg" in capsys.readouterr().out
     (figures / "speed.json").write_text("{} ")
     assert "speed.json is not what the part speed wrote" in problems()
     (figures / "speed.json").unlink()
