@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "film/filter.h"
@@ -58,23 +59,42 @@ inline FilmRegion reached_region(const FilmGeometry& g, const ReconstructionFilt
             {float(g.crop_width) + 2 * r, float(g.crop_height) + 2 * r}};
 }
 
-/// Calls `use(pixel index, h)` for every pixel of the crop whose filter reaches the film point.
+/// The pixels of the crop whose filter reaches a film point: columns from `column` on and rows from `row` on, with the weight
+/// x[i]·y[j]; none of both if there are none.
+class ReachedPixels {
+public:
+    ReachedPixels(const FilmGeometry& g, const ReconstructionFilter& filter, Vec2 point) {
+        // Also false for what is not a number, and for what no integer can represent.
+        if (!reached_region(g, filter).contains(point)) return;
+        x_ = filter.taps(point.x - float(g.crop_x)), y_ = filter.taps(point.y - float(g.crop_y));
+        left_ = std::max(0, -x_.first), right_ = std::min(x_.count, g.crop_width - x_.first);
+        top_ = std::max(0, -y_.first), bottom_ = std::min(y_.count, g.crop_height - y_.first);
+        if (left_ >= right_ || top_ >= bottom_) left_ = right_ = top_ = bottom_ = 0;
+    }
+
+    int column() const { return x_.first + left_; }
+    int row() const { return y_.first + top_; }
+    std::span<const float> x() const { return part(x_, left_, right_); }
+    std::span<const float> y() const { return part(y_, top_, bottom_); }
+
+private:
+    static std::span<const float> part(const ReconstructionFilter::Taps& t, int begin, int end) {
+        return {t.weight.data() + begin, size_t(end - begin)};
+    }
+
+    ReconstructionFilter::Taps x_, y_;
+    int left_ = 0, right_ = 0, top_ = 0, bottom_ = 0;
+};
+
+/// Calls `use(pixel index, h)` for those whose weight is not 0.
 template <class Use>
 void for_each_pixel(const FilmGeometry& g, const ReconstructionFilter& filter, Vec2 point,
                     const Use& use) {
-    // Also false for what is not a number, and for what no integer can represent.
-    if (!reached_region(g, filter).contains(point)) return;
-    const ReconstructionFilter::Taps x = filter.taps(point.x - float(g.crop_x)),
-                                     y = filter.taps(point.y - float(g.crop_y));
-    const int left = std::max(0, -x.first), right = std::min(x.count, g.crop_width - x.first);
-    const int top = std::max(0, -y.first), bottom = std::min(y.count, g.crop_height - y.first);
-    for (int j = top; j < bottom; ++j) {
-        const float hy = y.weight[size_t(j)];
-        if (hy == 0) continue;
-        for (int i = left; i < right; ++i)
-            if (const float h = x.weight[size_t(i)] * hy; h != 0)
-                use(g.pixel_index(x.first + i, y.first + j), h);
-    }
+    const ReachedPixels reached(g, filter, point);
+    for (size_t j = 0; j < reached.y().size(); ++j)
+        for (size_t i = 0; i < reached.x().size(); ++i)
+            if (const float h = reached.x()[i] * reached.y()[j]; h != 0)
+                use(g.pixel_index(reached.column() + int(i), reached.row() + int(j)), h);
 }
 
 /// What a contribution is added to: one pixel, or all pixels that the filter reaches from a film point.

@@ -34,7 +34,8 @@ public:
     /// Weights of pixels along one axis; pixel i has its centre at i + 1/2.
     static constexpr int kMostTaps = 32;
     struct Taps {
-        int first, count;  ///< Of the pixels first … first + count - 1; some weights may be 0.
+        int first = 0,
+            count = 0;  ///< Of the pixels first … first + count - 1; some weights may be 0.
         std::array<float, kMostTaps> weight;
     };
     /// Weights of the pixels that the film coordinate `x` contributes to; |x| < 2^22. Their number is the same for

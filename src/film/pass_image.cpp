@@ -37,7 +37,8 @@ void for_one_pixel(const FilmGeometry& g, const ReconstructionFilter& filter, Ve
 
 void PassImage::begin(uint64_t light_paths, const SampleGrid* grid) {
     if (light_paths > 0 && !splats_)
-        splats_ = std::make_unique<SplatBuffer>(geometry_.pixel_count(), typical_radiance_);
+        splats_ = std::make_unique<SplatBuffer>(geometry_.crop_width, geometry_.crop_height,
+                                                typical_radiance_);
     splat_scale_ = light_paths > 0 ? float(1.0 / double(light_paths)) : 0.0f;
     grid_ = grid;
     samples_.resize(grid ? grid->count() : geometry_.pixel_count());
@@ -49,11 +50,21 @@ void PassImage::add_splat(Vec2 point, Rgb value) {
         return;
     }
     value *= splat_scale_;
-    const auto add = [&](uint64_t pixel, float h) { splats_->add(pixel, value * h); };
-    if (grid_ || !filter_.is_wide())
-        for_each_pixel(geometry_, filter_, point, add);
-    else
-        for_one_pixel(geometry_, filter_, point, add);
+    if (grid_ || !filter_.is_wide()) {
+        const ReachedPixels reached(geometry_, filter_, point);
+        splats_->add(reached.column(), reached.row(), value, reached.x(), reached.y());
+    } else {
+        for_one_pixel(geometry_, filter_, point,
+                      [&](uint64_t pixel, float h) { splats_->add(pixel, value * h); });
+    }
+}
+
+void PassImage::prefetch_splat(Vec2 point) const {
+    const int taps = filter_.tap_count();
+    const float before = 0.5f * float(taps - 1);
+    const auto [column, row] = geometry_.pixel_near({point.x - before, point.y - before});
+    splats_->prefetch(column, row, std::min(taps, geometry_.crop_width - column),
+                      std::min(taps, geometry_.crop_height - row));
 }
 
 void PassImage::reject_if_not_finite(Rgb& value) {

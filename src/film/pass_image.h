@@ -39,7 +39,7 @@ public:
         samples_[grid_ ? grid_->place(index) : index] += value;
     }
     void add_splat(Vec2 point, Rgb value);
-    void prefetch_splat(Vec2 point) const { splats_->prefetch(geometry_.pixel_at(point)); }
+    void prefetch_splat(Vec2 point) const;
     bool has_splats() const { return splats_ != nullptr; }
 
     /// Ends the pass. Eye paths whose values are not finite become black and are counted as rejected.

@@ -3,12 +3,13 @@
 
 #include <array>
 #include <atomic>
-#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <mutex>
 #include <span>
 #include <vector>
+
+#include <tbb/spin_mutex.h>
 
 #include "color/rgb.h"
 
@@ -21,23 +22,26 @@ namespace etendue {
 /// digit 0. A larger value is added to the digit that can represent all its bits. Before a digit overflows, most of its
 /// value is carried to the next digit. Therefore no value is too large, and no sum overflows. Digits above 0 are
 /// allocated when they are needed.
+///
+/// A pixel belongs to a tile, which one thread at a time adds to: a splat of many pixels needs one lock for each tile.
 class SplatBuffer {
 public:
     /// Values may have any magnitude; the precision of small ones is relative to `typical_radiance`.
-    SplatBuffer(uint64_t pixels, double typical_radiance);
+    SplatBuffer(int width, int height, double typical_radiance);
 
-    /// Thread-safe. A value that is not finite is left out and counted as rejected.
+    /// Adds value·x[i]·y[j] to the pixels (column + i, row + j), all of which are in the image; there are at most kMostTaps of
+    /// each. Thread-safe. A pixel whose value is not finite is left out and counted as rejected.
+    void add(int column, int row, Rgb value, std::span<const float> x, std::span<const float> y);
+    /// The same for one pixel.
     void add(uint64_t pixel, Rgb value) {
-        const double units[] = {double(value.r) * units_per_radiance_,
-                                double(value.g) * units_per_radiance_,
-                                double(value.b) * units_per_radiance_};
-        if (!(is_small(units[0]) && is_small(units[1]) && is_small(units[2]))) [[unlikely]]
-            return add_large(pixel, units);
-        for (uint64_t c = 0; c < 3; ++c) add_small(pixel * 3 + c, units[c]);
+        const auto width = uint64_t(width_);
+        add_to_pixel(int(pixel % width), int(pixel / width), value);
     }
+    static constexpr size_t kMostTaps = 32;
+    /// Hints that such a splat may follow.
+    void prefetch(int column, int row, int columns, int rows) const;
     /// Number of values that were left out since the buffer was made or cleared.
     uint64_t rejected() const { return rejected_.load(std::memory_order_relaxed); }
-    void prefetch(uint64_t pixel) const { __builtin_prefetch(&lowest_[pixel * 3], 1); }
     /// Adds the sums of the pixels from `first` on to `to`, rounded once, and sets them to 0.
     void fold_into(uint64_t first, std::span<Rgb> to) { fold(first, to); }
     /// Adds every sum to the sums of many passes, in parallel, and clears the buffer.
@@ -46,41 +50,45 @@ public:
     void clear();
 
 private:
-    using Cell = std::atomic<int64_t>;
-
     static constexpr int kDigitBits = 26;
     /// Enough for the largest float over the smallest: 2^128/2^-149 = 2^277 = 2^(26·9 + 43).
     static constexpr size_t kDigits = 11;
-    /// Largest value, in units, that is added to digit 0. A cell never leaves (-2^63, 2^63): it can exceed kFull only
-    /// by the values that up to 2^12 threads, 2^50 each, add before it is carried.
+    /// Largest value, in units, that is added to digit 0.
     static constexpr double kLarge = 0x1p50;
+    /// A digit that reaches this is carried. Until then a value of 2^50 does not overflow it.
     static constexpr int64_t kFull = int64_t(1) << 61;
+    static constexpr int kTileWidth = 64, kTileHeight = 16;
+    /// In a cache line of its own, so that threads at neighbouring tiles do not wait for each other.
+    struct alignas(64) TileLock {
+        tbb::spin_mutex mutex;
+    };
 
-    static bool is_small(double units) { return std::fabs(units) < kLarge; }
-    void add_small(uint64_t cell, double units) {
-        if (const int64_t n = std::llrint(units)) add(0, cell, n);
+    TileLock& lock_of(int column, int row) const {
+        return locks_[size_t(row / kTileHeight) * size_t(tiles_across_) +
+                      size_t(column / kTileWidth)];
     }
-    void add(size_t digit, uint64_t cell, int64_t n) {
-        Cell& at = digit == 0 ? lowest_[cell] : higher(digit)[cell];
-        const int64_t sum = at.fetch_add(n, std::memory_order_relaxed) + n;
-        if (sum >= kFull || sum <= -kFull) [[unlikely]]
-            carry(digit, cell, at);
-    }
-    /// A value with a channel that is large or not finite.
-    void add_large(uint64_t pixel, const double (&units)[3]);
-    void carry(size_t digit, uint64_t cell, Cell& from);
+    void add_to_pixel(int column, int row, Rgb value);
+    /// Adds colours[k]·weights[k]·y to `count` adjacent cells of a tile whose lock is held.
+    void add_row(uint64_t first_cell, const float* colours, const float* weights, size_t count,
+                 float y);
+    /// Values, in units, some of which may be large or not finite.
+    void add_large(uint64_t first_cell, const double* units, size_t pixels);
+    /// Adds n, which is at most 2^61, to a digit.
+    void add(size_t digit, uint64_t cell, int64_t n);
     /// The cells of a digit above 0; allocated on first use.
-    Cell* higher(size_t digit);
+    int64_t* higher(size_t digit);
     /// Returns the sum in units, rounded once, and sets the cell to 0.
     double take(uint64_t cell, size_t digits);
     template <class To>
     void fold(uint64_t first, std::span<To> to);
 
+    int width_, tiles_across_;
     double unit_, units_per_radiance_;
-    std::vector<Cell> lowest_;
-    std::array<std::unique_ptr<Cell[]>, kDigits> owned_;
-    std::array<std::atomic<Cell*>, kDigits> higher_{};
+    std::vector<int64_t> lowest_;
+    std::array<std::unique_ptr<int64_t[]>, kDigits> owned_;
+    std::array<std::atomic<int64_t*>, kDigits> higher_{};
     std::mutex making_;
+    mutable std::vector<TileLock> locks_;
     std::atomic<uint64_t> rejected_{0};
 };
 

@@ -20,9 +20,11 @@ size_t triangle_index(const Technique& q) {
 }  // namespace
 
 struct TechniqueImages::Layer {
-    Layer(const Technique& q, uint64_t pixels, double typical_radiance)
-        : technique{q.strategy, q.s, q.t}, pass_weighted(pixels, typical_radiance),
-          pass_unweighted(pixels, typical_radiance), weighted(pixels), unweighted(pixels) {}
+    Layer(const Technique& q, const FilmGeometry& g, double typical_radiance)
+        : technique{q.strategy, q.s, q.t},
+          pass_weighted(g.crop_width, g.crop_height, typical_radiance),
+          pass_unweighted(g.crop_width, g.crop_height, typical_radiance), weighted(g.pixel_count()),
+          unweighted(g.pixel_count()) {}
 
     Technique technique;  ///< Gathers that drop either vertex share an image; drops_eye is false.
     bool is_folded = false;  ///< Whether a finished pass has contributed to it.
@@ -64,7 +66,7 @@ TechniqueImages::Layer* TechniqueImages::layer(const Technique& q) {
     if (found) return found;
     const std::lock_guard lock(creation_);
     if (!place.load()) {
-        owned_.push_back(std::make_unique<Layer>(q, geometry_.pixel_count(), typical_radiance_));
+        owned_.push_back(std::make_unique<Layer>(q, geometry_, typical_radiance_));
         place.store(owned_.back().get(), std::memory_order_release);
     }
     return place.load();

@@ -20,13 +20,13 @@ std::vector<float> folded(SplatBuffer& buffer, size_t pixels) {
     return red;
 }
 float sum_of(const std::vector<float>& values, double typical_radiance = 1) {
-    SplatBuffer buffer(1, typical_radiance);
+    SplatBuffer buffer(1, 1, typical_radiance);
     for (const float v : values) buffer.add(0, Rgb(v));
     return folded(buffer, 1)[0];
 }
 
 TEST(SplatBuffer, AddsToWhatIsThereAndIsEmptyAfterwards) {
-    SplatBuffer buffer(3, 1);
+    SplatBuffer buffer(3, 1, 1);
     buffer.add(1, {0.25f, -2, 8});
     buffer.add(1, {0.5f, 1, 0});
     std::vector<Rgb> sums(3, Rgb(1));
@@ -84,7 +84,7 @@ TEST(SplatBuffer, AnyFloatIsSummedWithoutError) {
 TEST(SplatBuffer, DoesNotWrap) {
     std::vector<float> sums;
     for (const float sign : {1.0f, -1.0f}) {
-        SplatBuffer buffer(1, 1);
+        SplatBuffer buffer(1, 1, 1);
         // 2^22 values of nearly 2^50 units.
         for (int i = 0; i < 1 << 22; ++i) buffer.add(0, {sign * 1023.5f, 0, 0});
         EXPECT_EQ(folded(buffer, 1)[0], sign * 1023.5f * 0x1p22f);
@@ -92,7 +92,7 @@ TEST(SplatBuffer, DoesNotWrap) {
 }
 
 TEST(SplatBuffer, RadianceOf1e8OnOnePixelDoesNotWrap) {
-    SplatBuffer buffer(1, 1);
+    SplatBuffer buffer(1, 1, 1);
     for (int i = 0; i < 1 << 20; ++i) buffer.add(0, {1e8f, 100, 1e12f});
     std::vector<Rgb> sum(1);
     buffer.fold_into(0, sum);
@@ -115,7 +115,7 @@ TEST(SplatBuffer, DoesNotDependOnTheOrder) {
         values.emplace_back(uint64_t(i) % kPixels, sign * size);
     }
     const auto sums = [&](int threads) {
-        SplatBuffer buffer(kPixels, 1);
+        SplatBuffer buffer(kPixels, 1, 1);
         std::vector<std::thread> workers;
         for (int t = 0; t < threads; ++t)
             workers.emplace_back([&, t] {
@@ -133,8 +133,58 @@ TEST(SplatBuffer, DoesNotDependOnTheOrder) {
     }
 }
 
+/// A splat of many pixels, in any tiles, is one of each pixel; also if it comes from several threads.
+TEST(SplatBuffer, AddsToRectanglesAsToTheirPixels) {
+    constexpr int kWidth = 200, kHeight = 50, kSplats = 3000;
+    constexpr uint64_t kPixels = kWidth * kHeight;
+    struct Splat {
+        int column, row;
+        Rgb value;
+        std::vector<float> x, y;
+    };
+    std::mt19937 random(4);
+    const auto integer = [&](int low, int high) {
+        return std::uniform_int_distribution(low, high)(random);
+    };
+    std::vector<Splat> splats;
+    for (int i = 0; i < kSplats; ++i) {
+        Splat s;
+        for (std::vector<float>* weights : {&s.x, &s.y})
+            for (int k = integer(1, i % 5 == 0 ? int(SplatBuffer::kMostTaps) : 4); k > 0; --k)
+                weights->push_back(std::uniform_real_distribution(-0.1f, 1.0f)(random));
+        s.column = integer(0, kWidth - int(s.x.size())),
+        s.row = integer(0, kHeight - int(s.y.size()));
+        s.value = {1, i % 50 == 0 ? 1e20f : 0.1f, i % 70 == 0 ? 3e38f : -1e-9f};
+        splats.push_back(std::move(s));
+    }
+    SplatBuffer expected(kWidth, kHeight, 1);
+    for (const Splat& s : splats)
+        for (size_t j = 0; j < s.y.size(); ++j)
+            for (size_t i = 0; i < s.x.size(); ++i)
+                expected.add(uint64_t(s.row + int(j)) * kWidth + uint64_t(s.column) + i,
+                             s.value * (s.x[i] * s.y[j]));
+    std::vector<Rgb> expected_sums(kPixels);
+    expected.fold_into(0, expected_sums);
+    for (const size_t threads : {1, 7}) {
+        SplatBuffer buffer(kWidth, kHeight, 1);
+        std::vector<std::thread> workers;
+        for (size_t t = 0; t < threads; ++t)
+            workers.emplace_back([&, t] {
+                for (size_t i = t; i < splats.size(); i += threads) {
+                    const Splat& s = splats[i];
+                    buffer.prefetch(s.column, s.row, int(s.x.size()), int(s.y.size()));
+                    buffer.add(s.column, s.row, s.value, s.x, s.y);
+                }
+            });
+        for (std::thread& w : workers) w.join();
+        std::vector<Rgb> sums(kPixels);
+        buffer.fold_into(0, sums);
+        EXPECT_EQ(sums, expected_sums) << threads;
+    }
+}
+
 TEST(SplatBuffer, ForgetsWhatIsCleared) {
-    SplatBuffer buffer(2, 1);
+    SplatBuffer buffer(2, 1, 1);
     buffer.add(0, Rgb(3));
     buffer.add(1, Rgb(1e9f));
     buffer.add(1, Rgb(1e25f));
@@ -147,7 +197,7 @@ TEST(SplatBuffer, LeavesOutWhatIsNotFinite) {
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
     EXPECT_EQ(sum_of({1, kInfinity, -kInfinity, std::nanf("")}), 1);
     // The whole value, which is counted once.
-    SplatBuffer buffer(1, 1);
+    SplatBuffer buffer(1, 1, 1);
     for (const float v : {kInfinity, -kInfinity, std::nanf("")}) {
         buffer.add(0, {1, v, 1e20f});
         buffer.add(0, Rgb(v));
