@@ -82,9 +82,7 @@ public:
     /// eval() at a surface point, whose texture_point() is made only where there is a texture.
     template <class Point>
     requires requires(const Point& at) { TexturePoint(at.texture_point()); }
-    Rgb eval(const Point& at) const {
-        return texture_ ? eval(at.texture_point()) : constant_;
-    }
+    Rgb eval(const Point& at) const { return texture_ ? eval(at.texture_point()) : constant_; }
     Rgb mean() const { return texture_ ? bounded(texture_->mean()) : constant_; }
     void resolution(int& width, int& height) const {
         width = height = 1;

@@ -64,8 +64,7 @@ public:
                        float hi) override {
         for (const auto& child : params.children("texture"))
             for (const auto& [index, texture] : made_textures_)
-                if (child.name == name && child.object == index)
-                    return TextureRef(texture, hi);
+                if (child.name == name && child.object == index) return TextureRef(texture, hi);
         const Rgb c = params.rgb(name, fallback);
         if (c.max() > hi) params.fail(name, "parameter is too large");
         return c;
