@@ -98,10 +98,12 @@ void GltfReader::read_surface(const JsonValue& m, int surface, VertexColors colo
     const JsonValue pbr = m["pbrMetallicRoughness"];
     const JsonValue metal_and_rough = pbr["metallicRoughnessTexture"];
     set_color(surface, "base_color", base_color(m, colors));
-    set_scalar(surface, "base_metalness", pbr["metallicFactor"].number(1, 0, 1), metal_and_rough,
-               "b");
+    const double metal = pbr["metallicFactor"].number(1, 0, 1);
+    set_scalar(surface, "base_metalness", metal, metal_and_rough, "b");
     set(surface, "specular_ior", ior(m));
-    if (const JsonValue specular = extension(m, "KHR_materials_specular")) {
+    // It is of what is not metal; `openpbr` has its colour at the edge of metal, too.
+    if (const JsonValue specular = extension(m, "KHR_materials_specular");
+        specular && (metal < 1 || metal_and_rough)) {
         set_scalar(surface, "specular_weight", specular["specularFactor"].number(1, 0, 1),
                    specular["specularTexture"], "opacity");
         Color tint{colour(specular["specularColorFactor"], Rgb(1))};
@@ -134,7 +136,9 @@ void GltfReader::read_surface(const JsonValue& m, int surface, VertexColors colo
     }
     if (const JsonValue cloth = extension(m, "KHR_materials_sheen")) {
         const Rgb c = clamped(colour(cloth["sheenColorFactor"], Rgb(0)));
-        set_scalar(surface, "fuzz_weight", double(c.max()), cloth["sheenColorTexture"], "all");
+        const JsonValue colors_of_cloth = cloth["sheenColorTexture"];
+        set_scalar(surface, "fuzz_weight", double(c.max()), colors_of_cloth, "all", false);
+        if (colors_of_cloth) warn(fmt::format("{}: the hue has no effect", colors_of_cloth.path()));
         if (c.max() > 0) set(surface, "fuzz_color", c / c.max());
         set(surface, "fuzz_roughness", cloth["sheenRoughnessFactor"].number(0, 0, 1));
         if (const JsonValue t = cloth["sheenRoughnessTexture"])
@@ -142,14 +146,18 @@ void GltfReader::read_surface(const JsonValue& m, int surface, VertexColors colo
     }
 }
 
-/// The roughness α along the bitangent, and α + (1 − α) strength² along the tangent, by their ratio and their mean square.
+/// The roughness α along the bitangent, and α + (1 − α) strength² along the tangent, by their ratio and their mean square. The ratio is
+/// a number; where a texture has the roughness, its texels are taken to be kTexel.
 void GltfReader::read_anisotropy(const JsonValue& brushed, int surface, double roughness,
                                  const JsonValue& texture) {
+    constexpr double kTexel = 0.5;
+    const double texel = texture ? kTexel : 1, typical = roughness * texel;
     const double strength = brushed["anisotropyStrength"].number(0, 0, 1),
-                 across = roughness * roughness,
-                 along = across + (1 - across) * strength * strength,
+                 across = typical * typical, along = across + (1 - across) * strength * strength,
                  mean = std::sqrt(std::sqrt((along * along + across * across) / 2));
-    set_scalar(surface, "specular_roughness", mean, texture, "g");
+    set_scalar(surface, "specular_roughness", mean / texel, texture, "g");
+    if (texture && strength > 0)
+        warn(fmt::format("{}: is approximate beside a texture of the roughness", brushed.path()));
     if (along > 0) set(surface, "specular_roughness_anisotropy", 1 - across / along);
     if (brushed["anisotropyRotation"].number(0) != 0 || brushed["anisotropyTexture"])
         warn(fmt::format("{}: the direction has no effect", brushed.path()));
@@ -399,8 +407,8 @@ void GltfReader::set_color(int object, const char* name, const Color& color) {
 }
 
 void GltfReader::set_scalar(int object, const char* name, double factor, const JsonValue& texture,
-                            const char* channel) {
-    const int image = factor > 0 ? bitmap(texture, true, channel) : -1;
+                            const char* channel, bool raw) {
+    const int image = factor > 0 ? bitmap(texture, raw, channel) : -1;
     if (image < 0)
         set(object, name, factor);
     else

@@ -134,6 +134,7 @@ std::optional<GltfReader::Primitive> GltfReader::read_primitive(const JsonValue&
         // Integers are fractions, also where an exporter does not say so.
         if (v.largest > 0 && !v.normalized)
             for (float& x : v.numbers) x = float(double(x) / v.largest);
+        for (float& x : v.numbers) x = std::clamp(x, 0.0f, 1.0f);
         mesh.colors = triples(v);
         if (v.components == 4)
             for (size_t i = 0; i < v.count; ++i) mesh.alphas.push_back(v.numbers[4 * i + 3]);

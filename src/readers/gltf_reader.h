@@ -96,7 +96,7 @@ private:
     int bitmap(const JsonValue& info, bool raw, const char* channel = nullptr);
     /// Sets `name` of `object` to a factor, times the channel of a texture where there is one.
     void set_scalar(int object, const char* name, double factor, const JsonValue& texture,
-                    const char* channel);
+                    const char* channel, bool raw = true);
     int scaled(int texture, ParamValue factor);
     /// Which of the mesh's two sets of texture coordinates a texture is a function of.
     int uv_set(const JsonValue& info);

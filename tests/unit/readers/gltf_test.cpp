@@ -123,7 +123,7 @@ TEST(Gltf, StripsAndFansHaveTheSameSides) {
 TEST(Gltf, IntegersAreFractionsWhereNormalized) {
     Bytes b = square();
     b.add<uint8_t>({0, 51, 255, 0, 255, 0, 102, 0})
-        .add<int16_t>({0, 0, 32767, 0, 0, 0, -32768, 0, 0, 32767, 0, 0});
+        .add<int16_t>({0, 0, 32767, 0, 0, 32767, -32768, 0, 0, 32767, 0, 0});
     const SceneDescription scene = read(
         document(b, R"("accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":4},
             {"bufferView":1,"componentType":5123,"type":"SCALAR","count":6},
@@ -132,13 +132,13 @@ TEST(Gltf, IntegersAreFractionsWhereNormalized) {
             "bufferViews":[{"buffer":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":12},
             {"buffer":0,"byteOffset":60,"byteLength":8},{"buffer":0,"byteOffset":68,"byteLength":24}],
             "nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":2,
-            "COLOR_0":3},"indices":1}]}])"),
+            "NORMAL":3,"COLOR_0":3},"indices":1}]}])"),
         b);
     const MeshData& mesh = scene.meshes[0];
     EXPECT_FLOAT_EQ(mesh.uvs[0].y, 0.2f);
     EXPECT_FLOAT_EQ(mesh.uvs[3].x, 0.4f);
     EXPECT_FLOAT_EQ(mesh.colors[0].z, 1);
-    EXPECT_FLOAT_EQ(mesh.colors[2].x, -1);
+    EXPECT_FLOAT_EQ(mesh.normals[2].x, -1);
     EXPECT_EQ(find_type(scene, "mesh_attribute").category, "texture");
 }
 
@@ -249,7 +249,8 @@ TEST(Gltf, TexturesKeepTheirTransformAndSampler) {
 
 TEST(Gltf, SpecularReflectionHasAColourAndAWeight) {
     const SceneDescription scene = with_material(
-        R"({"extensions":{"KHR_materials_ior":{"ior":1000},"KHR_materials_specular":{"specularFactor":0.5,
+        R"({"pbrMetallicRoughness":{"metallicFactor":0},
+            "extensions":{"KHR_materials_ior":{"ior":1000},"KHR_materials_specular":{"specularFactor":0.5,
             "specularTexture":{"index":0},"specularColorFactor":[2,1,0],"specularColorTexture":{"index":1}}}})",
         R"(,"textures":[{"source":0},{"source":1}],"images":[{"uri":"a.png"},{"uri":"b.png"}])");
     expect_no_warning_of_materials(scene);
@@ -272,8 +273,43 @@ TEST(Gltf, SpecularReflectionHasAColourAndAWeight) {
     }
     // Without textures the factors alone.
     const SceneDescription black = with_material(
-        R"({"extensions":{"KHR_materials_specular":{"specularColorFactor":[0,0,0]}}})");
+        R"({"pbrMetallicRoughness":{"metallicFactor":0.5},
+            "extensions":{"KHR_materials_specular":{"specularColorFactor":[0,0,0]}}})");
     EXPECT_EQ(value_of<Rgb>(find_type(black, "openpbr"), "specular_color"), Rgb(0));
+    // It is of dielectrics; in openpbr the colour is also that of the edge of metal.
+    const SceneDescription metal = with_material(
+        R"({"extensions":{"KHR_materials_specular":{"specularFactor":0.5,"specularColorFactor":[0,0,0]}}})");
+    EXPECT_FALSE(find_type(metal, "openpbr").find("specular_color"));
+    EXPECT_FALSE(find_type(metal, "openpbr").find("specular_weight"));
+}
+
+// The texels are taken to be 0.5 for the ratio of the roughnesses, which is exact there.
+TEST(Gltf, AnisotropyKeepsItsStrengthBesideATextureOfRoughness) {
+    const SceneDescription scene = with_material(
+        R"({"extensions":{"KHR_materials_anisotropy":{"anisotropyStrength":0.8}},
+            "pbrMetallicRoughness":{"metallicRoughnessTexture":{"index":0}}})",
+        R"(,"textures":[{"source":0}],"images":[{"uri":"a.png"}])");
+    const SceneObject& m = find_type(scene, "openpbr");
+    const double across = 0.25, along = 0.25 + 0.75 * 0.64;
+    EXPECT_NEAR(value_of<double>(m, "specular_roughness_anisotropy"), 1 - across / along, 1e-6);
+    EXPECT_NEAR(std::pow(0.5 * value_of<double>(find_type(scene, "scale"), "scale"), 4),
+                (along * along + across * across) / 2, 1e-6);
+    EXPECT_TRUE(std::any_of(scene.warnings.begin(), scene.warnings.end(), [](const auto& w) {
+        return w.find("beside a texture of the roughness") != w.npos;
+    }));
+}
+
+TEST(Gltf, SheenColoursAreNotLinear) {
+    const SceneDescription scene = with_material(
+        R"({"extensions":{"KHR_materials_sheen":{"sheenColorFactor":[0.5,0.25,0],"sheenColorTexture":{"index":0}}}})",
+        R"(,"textures":[{"source":0}],"images":[{"uri":"a.png"}])");
+    EXPECT_FALSE(find_type(scene, "bitmap").find("raw"));
+    EXPECT_FALSE(find_type(scene, "bitmap").find("channel"));
+    EXPECT_EQ(value_of<double>(find_type(scene, "scale"), "scale"), 0.5);
+    EXPECT_EQ(value_of<Rgb>(find_type(scene, "openpbr"), "fuzz_color"), Rgb(1, 0.5f, 0));
+    EXPECT_TRUE(std::any_of(scene.warnings.begin(), scene.warnings.end(), [](const auto& w) {
+        return w.find("sheenColorTexture: the hue has no effect") != w.npos;
+    }));
 }
 
 TEST(Gltf, SpecularGlossinessIsReadAsWell) {
@@ -404,6 +440,20 @@ TEST(Gltf, HabitsOfExportersAreAccepted) {
     EXPECT_TRUE(scene.meshes[0]->alphas.empty());  // one everywhere
     EXPECT_EQ(value_of<double>(find_type(scene, "spot"), "beam_width"),
               value_of<double>(find_type(scene, "spot"), "cutoff_angle"));
+}
+
+TEST(Gltf, VertexColoursAreClamped) {
+    Bytes b = square();
+    b.add<float>({2, -1, 0.5f, 1, 1, 1, 1, 1, 1, 1, 1, 1});
+    const SceneDescription scene = read(
+        document(b, R"("accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":4},
+            {"bufferView":1,"componentType":5123,"type":"SCALAR","count":6},
+            {"bufferView":2,"componentType":5126,"type":"VEC3","count":4}],
+            "bufferViews":[{"buffer":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":12},
+            {"buffer":0,"byteOffset":60,"byteLength":48}],"nodes":[{"mesh":0}],
+            "meshes":[{"primitives":[{"attributes":{"POSITION":0,"COLOR_0":2},"indices":1}]}])"),
+        b);
+    EXPECT_EQ(scene.meshes[0]->colors[0], (Vec3{1, 0, 0.5f}));
 }
 
 TEST(Gltf, CamerasLookAlongMinusZ) {
