@@ -44,73 +44,20 @@ struct GatherSearch {
     /// Calls use(pair) for the pairs of z_{t-1}, with y_0 … y_{s-1} in work.pair as far as the join reads them.
     template <class Use>
     void for_each_pair(int t, const Use& use) const {
-        const float reflected = reflected_flux(t);
-        const Vertex& z = work.z[t - 1];
-        const LightVertexGrid& grid = grid_of(z);
-        // Roulette for the whole search: most pairs of some vertices contribute little. The number of pairs found has
-        // the second moment n (n+1), where n is its mean, and a search costs n+1 times as much as one that finds none.
-        const float partners = std::max(1.0f, density.partners(z.pair_level) *
-                                                  sqr(grid.radius() / inner_grid.radius()));
-        const float search_survival = join_survival(
-            roulette.of_search(t) * reflected * grid.mean_flux() * std::sqrt(partners), threshold);
+        const EyeEnd eye = eye_end(t);
+        const float search_survival = survival_of_search(eye);
         if (!survives(search_survival, pair_number(0, t, kSearch))) return;
-        const uint8_t after = gloss_after(t);
-        const Neighbourhood near_eye = near(z, arrival_side(z), grid.radius());
-
-        struct Choice {
-            float estimate, survival, unlimited_survival;
-            bool drops_eye, drops_light;
-        };
-        GatherSums& sums = GatherSums::of(work);
-        uint64_t& candidates = z.is_fixed_by_film ? sums.candidates : sums.inner_candidates;
-        std::optional<SystematicSampling> selection;
-        const auto is_selected = [&](float q) {
-            if (!(q < 1)) return true;
-            if (!selection) {
-                c.sampler.seek(Stream::Roulette, pair_number(0, t, kLook));
-                selection.emplace(c.sampler.next_1d_unstructured());
-            }
-            return selection->selects(double(q));
-        };
-        const auto choose = [&](const GatherCandidate& y) -> std::optional<Choice> {
-            ++candidates;
-            const int edges = y.s + t - 2;
-            if (edges > max_depth || !(n.gathers(edges) > 0)) return {};
-            Choice choice;
-            choice.drops_eye =
-                drops(n.pairs.rule, true, y.gloss_before, after) && y.side.admits(near_eye.side);
-            choice.drops_light =
-                drops(n.pairs.rule, false, y.gloss_before, after) && near_eye.contains(y.p, y.side);
-            if (!choice.drops_eye && !choice.drops_light) return {};
-            ++work.stats.pairs;
-            sums.expected_pairs[z.is_fixed_by_film] +=
-                uint64_t(std::lround(256 / std::max(search_survival, 1e-6f)));
-            choice.estimate = reflected * y.flux;
-            const float worth = roulette.of(y.s, t) * choice.estimate;
-            choice.unlimited_survival = threshold > 0 ? worth / threshold : kInf;
-            choice.survival = std::min(join_survival(worth, threshold), search_survival);
-            if (!is_selected(choice.survival / search_survival)) return {};
-            return choice;
-        };
-        // The neighbourhood of z_{t-1}, or else the ball that holds all those that contain it.
-        FlatBall region{z.p, grid.radius()};
-        if (keeps_eye(t)) region.n = z.ng, region.half_height = near_eye.half_height;
-        grid.for_each_in(region, choose, [&](const GatherCandidate& y, const Choice& choice) {
-            for (const bool eye : {true, false}) {
-                if (!(eye ? choice.drops_eye : choice.drops_light)) continue;
-                cache.restore_first(c.scene, y.vertex, eye ? y.s : y.s - 1, work.is_observed,
-                                    work.pair);
-                const Neighbourhood kept =
-                    eye ? near(work.pair[y.s - 1], y.side, grid.radius()) : near_eye;
-                if (eye && !kept.contains(near_eye.p, near_eye.side)) continue;
-                use(GatherPair{.technique = {Strategy::Gather, y.s, t, eye},
-                               .kept = kept,
-                               .number = pair_number(y.vertex, t, eye ? kDropsEye : kDropsLight),
-                               .estimate = choice.estimate,
-                               .survival = choice.survival,
-                               .unlimited_survival = choice.unlimited_survival});
-            }
-        });
+        PairSelection selection(c.sampler, pair_number(0, t, kSelection));
+        eye.grid.for_each_in(
+            eye.region,
+            [&](const GatherCandidate& y) -> std::optional<Choice> {
+                const std::optional<Choice> choice = choose(eye, y, search_survival);
+                if (!choice || !selection.selects(choice->survival / search_survival)) return {};
+                return choice;
+            },
+            [&](const GatherCandidate& y, const Choice& choice) {
+                use_pairs(eye, y, choice, use);
+            });
     }
 
     /// Factor from the contribution of a gather to the pixel's value, without r and roulette.
@@ -127,14 +74,113 @@ struct GatherSearch {
     }
 
 private:
-    /// Gloss of the vertex from which z_{t-1} was sampled.
-    uint8_t gloss_after(int t) const { return gloss(work.z[t - 2], work.z[t - 2].is_delta); }
-    /// Whether the pairs of z_{t-1} can only drop the light vertex: next to the lens and to delta events, see drops().
-    bool keeps_eye(int t) const { return gloss_after(t) >= kDeltaGloss; }
-    const LightVertexGrid& grid_of(const Vertex& z) const {
-        return z.is_fixed_by_film ? seen_grid : inner_grid;
+    /// z_{t-1}, and what all of its pairs have in common.
+    struct EyeEnd {
+        int t;
+        const Vertex& z;
+        uint8_t gloss_after;  ///< Of the vertex from which it was sampled.
+        Neighbourhood near;
+        const LightVertexGrid& grid;
+        FlatBall region;  ///< Contains all light vertices that make a pair with it.
+        /// Estimated contribution to the pixel of a pair per unit of flux.
+        float reflected;
+    };
+    /// A light vertex that makes one or two pairs, which are kept if neither roulette ends them.
+    struct Choice {
+        float estimate, survival, unlimited_survival;  ///< As in GatherPair.
+        bool drops_eye, drops_light;
+    };
+    /// Selects pairs with given probabilities, by one number, which is drawn when it is needed.
+    class PairSelection {
+    public:
+        PairSelection(Sampler& sampler, uint64_t number) : sampler_(sampler), number_(number) {}
+        bool selects(float q) {
+            if (!(q < 1)) return true;
+            if (!sampling_) {
+                sampler_.seek(Stream::Roulette, number_);
+                sampling_.emplace(sampler_.next_1d_unstructured());
+            }
+            return sampling_->selects(double(q));
+        }
+
+    private:
+        Sampler& sampler_;
+        uint64_t number_;
+        std::optional<SystematicSampling> sampling_;
+    };
+
+    EyeEnd eye_end(int t) const {
+        const Vertex& z = work.z[t - 1];
+        const LightVertexGrid& grid = z.is_fixed_by_film ? seen_grid : inner_grid;
+        EyeEnd eye{.t = t,
+                   .z = z,
+                   .gloss_after = gloss(work.z[t - 2], work.z[t - 2].is_delta),
+                   .near = near(z, arrival_side(z), grid.radius()),
+                   .grid = grid,
+                   .region = {z.p, grid.radius()},
+                   .reflected = 0};
+        // Next to the lens and to delta events only the light vertex can be dropped, see drops(): the neighbourhood of z_{t-1}.
+        // Otherwise, the ball that holds all neighbourhoods which contain z_{t-1}.
+        const bool keeps_eye = eye.gloss_after >= kDeltaGloss;
+        if (keeps_eye) eye.region.n = z.ng, eye.region.half_height = eye.near.half_height;
+        eye.reflected = reflected_flux(z, keeps_eye);
+        return eye;
     }
-    enum Use : uint64_t { kDropsEye, kDropsLight, kLook, kSearch };
+
+    /// Probability of surviving the roulette for the whole search: most pairs of some vertices contribute little. The number of
+    /// pairs found has the second moment n (n+1), where n is its mean, and a search costs n+1 times as much as one that finds none.
+    float survival_of_search(const EyeEnd& eye) const {
+        const float partners = std::max(1.0f, density.partners(eye.z.pair_level) *
+                                                  sqr(eye.grid.radius() / inner_grid.radius()));
+        return join_survival(roulette.of_search(eye.t) * eye.reflected * eye.grid.mean_flux() *
+                                 std::sqrt(partners),
+                             threshold);
+    }
+
+    /// Which of the two vertices the pairs drop, and how probably they survive; empty if there is no pair.
+    std::optional<Choice> choose(const EyeEnd& eye, const GatherCandidate& y,
+                                 float search_survival) const {
+        GatherSums& sums = GatherSums::of(work);
+        ++(eye.z.is_fixed_by_film ? sums.candidates : sums.inner_candidates);
+        const int edges = y.s + eye.t - 2;
+        if (edges > max_depth || !(n.gathers(edges) > 0)) return {};
+        Choice choice;
+        choice.drops_eye = drops(n.pairs.rule, true, y.gloss_before, eye.gloss_after) &&
+                           y.side.admits(eye.near.side);
+        choice.drops_light = drops(n.pairs.rule, false, y.gloss_before, eye.gloss_after) &&
+                             eye.near.contains(y.p, y.side);
+        if (!choice.drops_eye && !choice.drops_light) return {};
+        ++work.stats.pairs;
+        sums.expected_pairs[eye.z.is_fixed_by_film] +=
+            uint64_t(std::lround(256 / std::max(search_survival, 1e-6f)));
+        choice.estimate = eye.reflected * y.flux;
+        const float worth = roulette.of(y.s, eye.t) * choice.estimate;
+        choice.unlimited_survival = threshold > 0 ? worth / threshold : kInf;
+        choice.survival = std::min(join_survival(worth, threshold), search_survival);
+        return choice;
+    }
+
+    template <class Use>
+    void use_pairs(const EyeEnd& eye, const GatherCandidate& y, const Choice& choice,
+                   const Use& use) const {
+        for (const bool drops_eye : {true, false}) {
+            if (!(drops_eye ? choice.drops_eye : choice.drops_light)) continue;
+            cache.restore_first(c.scene, y.vertex, drops_eye ? y.s : y.s - 1, work.is_observed,
+                                work.pair);
+            const Neighbourhood kept =
+                drops_eye ? near(work.pair[y.s - 1], y.side, eye.grid.radius()) : eye.near;
+            if (drops_eye && !kept.contains(eye.near.p, eye.near.side)) continue;
+            use(GatherPair{.technique = {Strategy::Gather, y.s, eye.t, drops_eye},
+                           .kept = kept,
+                           .number =
+                               pair_number(y.vertex, eye.t, drops_eye ? kDropsEye : kDropsLight),
+                           .estimate = choice.estimate,
+                           .survival = choice.survival,
+                           .unlimited_survival = choice.unlimited_survival});
+        }
+    }
+
+    enum Use : uint64_t { kDropsEye, kDropsLight, kSelection, kSearch };
     /// Distinct for distinct arguments with t < 2^22, and from join_number().
     static uint64_t pair_number(uint32_t vertex, int t, Use use) {
         return uint64_t(1) << 60 | uint64_t(vertex) << 24 | uint64_t(uint32_t(t)) << 2 | use;
@@ -148,14 +194,13 @@ private:
         return {kept.p, kept.ng, side, radius, flatness * radius};
     }
 
-    /// Estimated contribution to the pixel of a pair at z_{t-1} per unit of flux, before the light path is looked up:
-    /// that of a merge on a diffuse surface, times the brightness of the highlight on a glossy one.
-    float reflected_flux(int t) const {
-        const Vertex& z = work.z[t - 1];
+    /// See EyeEnd::reflected, before the light path is looked up: that of a merge on a diffuse surface, times the brightness of
+    /// the highlight on a glossy one.
+    float reflected_flux(const Vertex& z, bool keeps_eye) const {
         const float roughness = 1 - float(z.gloss) / kSharpestGloss;
         const float highlight = std::max(1.0f, 0.25f / sqr(roughness));
         const float disc = n.pairs.disc_of(z.is_fixed_by_film);
-        const float clamped = keeps_eye(t) ? 1 : std::max(1.0f, disc * z.pdf_fwd);
+        const float clamped = keeps_eye ? 1 : std::max(1.0f, disc * z.pdf_fwd);
         return highlight * clamped * luminance(z.beta) * std::fabs(work.z.film_weight) *
                c.splat_scale / (kPi * disc);
     }
