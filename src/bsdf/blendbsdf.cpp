@@ -43,6 +43,9 @@ public:
     bool may_be_smooth() const override {
         return nested_[0]->may_be_smooth() || nested_[1]->may_be_smooth();
     }
+    bool may_have_delta() const override {
+        return nested_[0]->may_have_delta() || nested_[1]->may_have_delta();
+    }
     bool perturbs_normals() const override {
         return nested_[0]->perturbs_normals() || nested_[1]->perturbs_normals();
     }

@@ -19,6 +19,7 @@ public:
         list.add(frame, DiffuseLobe{reflectance_.eval(point)}, weight);
     }
     bool needs_tangents() const override { return false; }
+    bool may_have_delta() const override { return false; }
     Rgb mean_albedo() const override { return reflectance_.mean(); }
 
 private:

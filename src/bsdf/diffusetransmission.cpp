@@ -30,6 +30,7 @@ public:
     }
     bool is_transmissive() const override { return true; }
     bool needs_tangents() const override { return false; }
+    bool may_have_delta() const override { return false; }
     Rgb mean_albedo() const override { return reflectance_.mean() + transmittance_.mean(); }
 
 private:

@@ -59,6 +59,7 @@ public:
                                   roughness_.eval(point.texture_point())},
                  weight);
     }
+    bool may_have_delta() const override { return false; }
     Rgb mean_albedo() const override {
         return specular_.mean() + diffuse_.mean() * (Rgb(1) - specular_.mean());
     }

@@ -70,6 +70,9 @@ public:
         return may_have(diffuse_) || may_have(diffuse_transmission_) || may_have(glossy_) ||
                may_have(glossy_transmission_);
     }
+    bool may_have_delta() const override {
+        return may_have(specular_) || may_have(specular_transmission_);
+    }
     Rgb mean_albedo() const override {
         const float F = fresnel_dielectric(1, eta_).R;
         return diffuse_.mean() + diffuse_transmission_.mean() +

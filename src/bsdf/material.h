@@ -71,6 +71,8 @@ public:
     virtual bool is_two_sided() const { return is_transmissive(); }
     /// False if all lobes are delta at every point, so that connections are never possible.
     virtual bool may_be_smooth() const { return true; }
+    /// False if no lobe is delta at any point.
+    virtual bool may_have_delta() const { return true; }
     /// Whether it shades with other normals than that of the shape.
     virtual bool perturbs_normals() const { return false; }
     /// Whether append() uses SurfacePoint::dpdu and dpdv.

@@ -42,6 +42,9 @@ public:
     bool may_be_smooth() const override {
         return any([](const Material& m) { return m.may_be_smooth(); });
     }
+    bool may_have_delta() const override {
+        return any([](const Material& m) { return m.may_have_delta(); });
+    }
     bool perturbs_normals() const override {
         return any([](const Material& m) { return m.perturbs_normals(); });
     }

@@ -485,6 +485,10 @@ public:
                sqr(roughness_.eval_scalar(Vec2())) > Microfacet::kMinAlpha || may_be(coat_) ||
                may_be(fuzz_) || !(is_one(metalness_) || is_one(transmission_));
     }
+    bool may_have_delta() const override {
+        return constants_.alpha_varies || constants_.alpha <= Microfacet::kMinAlpha ||
+               may_be(coat_) || (is_thin_ && may_be(transmission_));
+    }
     Rgb mean_albedo() const override {
         const float metal = metalness_.mean().mean(),
                     glass = (1 - metal) * transmission_.mean().mean();

@@ -25,6 +25,7 @@ public:
         list.add(frame, OrenNayarLobe{reflectance_.eval(point.texture_point()), A_, B_}, weight);
     }
     bool needs_tangents() const override { return false; }
+    bool may_have_delta() const override { return false; }
     Rgb mean_albedo() const override { return reflectance_.mean(); }
 
 private:

@@ -61,6 +61,7 @@ public:
                            .specular_probability = sum > 0 ? s.mean() / sum : 0},
                  weight);
     }
+    bool may_have_delta() const override { return false; }
     Rgb mean_albedo() const override {
         const Rgb sum = diffuse_.mean() + specular_.mean();
         return sum / std::max(sum.max(), 1.0f);

@@ -289,6 +289,7 @@ public:
     bool is_transmissive() const override {
         return !spec_trans_.is_constant() || spec_trans_.eval_scalar(Vec2()) > 0;
     }
+    bool may_have_delta() const override { return false; }
     Rgb mean_albedo() const override { return base_color_.mean(); }
 
 private:

@@ -58,6 +58,7 @@ public:
                                     reflectance_.eval(at)},
                  weight);
     }
+    bool may_have_delta() const override { return false; }
     Rgb mean_albedo() const override {
         return reflectance_.mean() * fresnel_conductor(1, ior_.eta.mean(), ior_.k.mean());
     }

@@ -99,6 +99,7 @@ public:
                  weight);
     }
     bool is_transmissive() const override { return true; }
+    bool may_have_delta() const override { return false; }
     Rgb mean_albedo() const override {
         return RoughDielectricLobe{{}, eta_, reflectance_.mean(), transmittance_.mean()}
             .albedo_estimate();

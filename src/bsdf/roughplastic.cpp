@@ -68,6 +68,7 @@ public:
                                   params_.thickness, T.table()},
                  weight);
     }
+    bool may_have_delta() const override { return false; }
     Rgb mean_albedo() const override { return params_.mean_albedo(); }
 
 private:

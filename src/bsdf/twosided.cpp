@@ -31,6 +31,9 @@ public:
     bool may_be_smooth() const override {
         return front_->may_be_smooth() || back_->may_be_smooth();
     }
+    bool may_have_delta() const override {
+        return front_->may_have_delta() || back_->may_have_delta();
+    }
     bool needs_tangents() const override {
         return front_->needs_tangents() || back_->needs_tangents();
     }

@@ -29,6 +29,7 @@ public:
     bool is_transmissive() const override { return nested_->is_transmissive(); }
     bool is_two_sided() const override { return nested_->is_two_sided(); }
     bool may_be_smooth() const override { return nested_->may_be_smooth(); }
+    bool may_have_delta() const override { return nested_->may_have_delta(); }
     bool perturbs_normals() const override { return nested_->perturbs_normals(); }
     Rgb mean_albedo() const override { return nested_->mean_albedo(); }
 

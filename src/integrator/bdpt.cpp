@@ -1,5 +1,5 @@
 // Bidirectional path tracing [Veach & Guibas 1994; Lafortune & Willems 1993]: all techniques C(s,t), combined by the power
-// heuristic. Unbiased. The eye path of a pixel is connected to one light path. Joins with a small contribution pass Russian
+// heuristic; with specular_connections=on also X(s,t). Unbiased. The eye path of a pixel is connected to one light path. Joins with a small contribution pass Russian
 // roulette before their shadow ray (Bidirectional::add()).
 
 #include "integrator/bdpt.h"
@@ -88,7 +88,10 @@ public:
     void learn(const LearnContext& pass) override { paths_.learn(pass); }
     void save(LearnedState& to) const override { paths_.save(to); }
     void load(LearnedState& from) override { paths_.load(from); }
-    void prepare(const PassContext& pass) override { paths_.train(pass); }
+    void prepare(const PassContext& pass) override {
+        paths_.train(pass);
+        paths_.decide_specular(pass, counts(pass.scene, pass.light_paths));
+    }
 
     void trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
                          RenderStats& stats) const override {
@@ -101,16 +104,20 @@ public:
     TechniqueCounts counts(const Scene& scene, uint64_t light_paths) const override {
         TechniqueCounts n = Bidirectional::counts(scene, light_paths);
         n.guide = paths_.guiding().guide();
-        n.specular_depth = paths_.specular().depth();
+        n.specular_depth = paths_.specular().depth(scene);
         return n;
     }
     uint64_t light_paths(const Scene& scene) const override {
         return given_light_paths_ > 0 ? given_light_paths_ : scene.film().pixel_count();
     }
-    bool samples_alone() const override { return !paths_.guiding().is_on(); }
+    bool samples_alone() const override {
+        return !paths_.guiding().is_on() && !paths_.specular().is_automatic();
+    }
     Estimator estimator() const override { return Estimator::Unbiased; }
     std::vector<std::pair<std::string, double>> figures() const override {
-        return paths_.guiding().figures();
+        std::vector<std::pair<std::string, double>> figures = paths_.guiding().figures();
+        paths_.specular().add_figures(figures);
+        return figures;
     }
 
 private:

@@ -37,6 +37,11 @@ public:
         guiding_.train(pass, depth_, walks);
     }
 
+    /// Decides on specular connections, see Specular::decide(). For Integrator::prepare(), after train().
+    void decide_specular(const PassContext& pass, const TechniqueCounts& counts) {
+        specular_.decide(pass, depth_, counts);
+    }
+
     /// Sets the thresholds of efficiency-optimised roulette from the statistics of earlier passes, in which all samples
     /// together traced `rays` rays.
     void learn(const LearnContext& pass, uint64_t rays);
@@ -44,10 +49,12 @@ public:
     void save(LearnedState& to) const {
         to.put(thresholds_);
         guiding_.save(to);
+        specular_.save(to);
     }
     void load(LearnedState& from) {
         from.get(thresholds_);
         guiding_.load(from);
+        specular_.load(from);
     }
     const Guiding& guiding() const { return guiding_; }
     const Specular& specular() const { return specular_; }
@@ -84,21 +91,21 @@ public:
                   const Workspace& work, float factor = 1) const {
         if (counts.hit > 0 && t - 1 >= shortest_)
             for_each_hit(c.scene, work.z, t, counts, [&](const Join& j) {
-                c.sink.add(specular_.weighed_hit(j, c.scene, work.z, t, counts),
-                           j.contribution * factor);
+                Specular::add_hit(c, j, work.z, t, counts, factor);
             });
     }
     /// Adds C(s+1,0).
     void add_hit_lens(const SampleContext& c, const TechniqueCounts& counts, int s,
                       Workspace& work) const {
         auto join = join_hit_lens(c.scene, work.y, s, counts);
-        if (join) specular_.weigh_hit_lens(*join, c.scene, work.y, s, counts);
+        if (join) Specular::weigh_hit_lens(*join, c.scene, work.y, s, counts);
         add(c, join, work);
     }
     /// Adds X(s,t).
     void add_specular(const SampleContext& c, const TechniqueCounts& counts, int t,
                       Workspace& work) const {
-        specular_.add(c, t, depth_.max_depth, counts, work);
+        if (counts.specular_depth > 0)
+            Specular::add(c, t, depth_.max_depth, threshold(c), counts, work);
     }
 
     /// Adds the join, times `factor`, if it exists and passes test(), whose result is returned. If z_{t-1} has several

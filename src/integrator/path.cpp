@@ -2,7 +2,7 @@
 //
 // Techniques: C(0,t) hits and C(1,t) next events, combined by the power heuristic. Unbiased. Limits: light of small
 // emitters that reaches diffuse surfaces by way of mirrors or glass is found only by chance. The same light of point
-// and directional emitters is never found.
+// and directional emitters is never found. With specular_connections=on, X(s,t) finds both where the glass is smooth.
 
 #include "integrator/path.h"
 
@@ -16,12 +16,20 @@ namespace {
 class PathIntegrator final : public Integrator {
 public:
     explicit PathIntegrator(const IntegratorParams& p)
-        : depth_(DepthOptions::from(p)), guiding_(p), specular_(p) {}
+        : depth_(DepthOptions::from(p)), guiding_(p), specular_(p),
+          roulette_(p.number("roulette", 0, 1)) {}
 
-    void save(LearnedState& to) const override { guiding_.save(to); }
-    void load(LearnedState& from) override { guiding_.load(from); }
+    void save(LearnedState& to) const override {
+        guiding_.save(to);
+        specular_.save(to);
+    }
+    void load(LearnedState& from) override {
+        guiding_.load(from);
+        specular_.load(from);
+    }
     void prepare(const PassContext& pass) override {
         guiding_.train(pass, depth_, GuidedWalks::Eye);
+        specular_.decide(pass, depth_, counts(pass.scene, 0));
     }
 
     void trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
@@ -33,45 +41,61 @@ public:
         const TechniqueCounts counts = this->counts(c.scene, 0);
         const SubPath& z = work.z;
         for (int t = 2; t <= z.size(); ++t) {
-            for_each_hit(c.scene, z, t, counts, [&](const Join& j) {
-                c.sink.add(specular_.weighed_hit(j, c.scene, z, t, counts), j.contribution);
-            });
+            for_each_hit(c.scene, z, t, counts,
+                         [&](const Join& j) { Specular::add_hit(c, j, z, t, counts); });
             if (t > depth_.max_depth) break;
             if (const auto j = join_next_event(c.scene, z, t, c.sampler, counts))
                 if (const float Tr = visibility(c.scene, *j, work.stats); Tr > 0)
                     c.sink.add(*j, j->contribution * Tr);
-            specular_.add(c, t, depth_.max_depth, counts, work);
+            if (counts.specular_depth > 0)
+                Specular::add(c, t, depth_.max_depth, threshold(c), counts, work);
         }
     }
 
-    TechniqueCounts counts(const Scene&, uint64_t /*light_paths*/) const override {
+    TechniqueCounts counts(const Scene& scene, uint64_t /*light_paths*/) const override {
         return {.hit = 1,
                 .next_event = 1,
                 .guide = guiding_.guide(),
-                .specular_depth = specular_.depth()};
+                .specular_depth = specular_.depth(scene)};
     }
     uint64_t light_paths(const Scene&) const override { return 0; }
     std::vector<std::pair<std::string, double>> figures() const override {
-        return guiding_.figures();
+        std::vector<std::pair<std::string, double>> figures = guiding_.figures();
+        specular_.add_figures(figures);
+        return figures;
     }
-    bool samples_alone() const override { return !guiding_.is_on(); }
+    bool samples_alone() const override { return !guiding_.is_on() && !specular_.is_automatic(); }
     Estimator estimator() const override { return Estimator::Unbiased; }
 
 private:
+    float threshold(const SampleContext& c) const {
+        return roulette_ > 0 ? roulette_ * c.expected_of_pixel() : 0;
+    }
+
     DepthOptions depth_;
     Guiding guiding_;
     Specular specular_;
+    float
+        roulette_;  ///< Threshold of specular connections, relative to the pixel's expected luminance.
 };
 
 }  // namespace
 
 IntegratorEntry path_entry() {
-    return {{"integrator", "path",
-             "Path tracing with next event estimation and MIS, the simplest method. Unbiased.",
-             concat({depth_params(), Specular::params(), Guiding::params()})},
-            [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
-                return std::make_unique<PathIntegrator>(p);
-            }};
+    return {
+        {"integrator", "path",
+         "Path tracing with next event estimation and MIS, the simplest method. Unbiased.",
+         concat(
+             {depth_params(),
+              Specular::params(),
+              {{"roulette", ParamKind::Float, "0.15",
+                "Specular connections of small contributions are searched for at random, and the "
+                "others weighted up. Threshold, in [0, 1], as a fraction of the pixel's luminance "
+                "in earlier passes; 0 searches for all."}},
+              Guiding::params()})},
+        [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
+            return std::make_unique<PathIntegrator>(p);
+        }};
 }
 
 }  // namespace etendue

@@ -4,7 +4,7 @@
 // interpolated in between.
 //
 // Techniques: C(0,t), C(s,1), C(s,0) as in bdpt; C(s,t) with s, t ≥ 2 from the stored vertices; C(1,t) from their y_0,
-// from next events, or from both. Unbiased. All eye paths of a pass share the M light paths, so the errors of M samples
+// from next events, or from both; with specular_connections=on also X(s,t). Unbiased. All eye paths of a pass share the M light paths, so the errors of M samples
 // of a connection are correlated. The weights therefore count them as 1 (`upper`) [eq. 16-17], or as M, as if they were
 // independent (`standard`). The weights contain neither K nor the mass function, because these are not defined for
 // paths of other techniques.
@@ -36,7 +36,8 @@ constexpr std::array<Choice<bool>, 2> kIsWeighted{{{"contribution", false}, {"we
 class PcbptIntegrator final : public Integrator {
 public:
     explicit PcbptIntegrator(const IntegratorParams& p)
-        : paths_(p, Guiding(p)), light_paths_(uint64_t(p.integer("light_paths", 1, 1 << 20))),
+        : paths_(p, Guiding(p), Specular(p)),
+          light_paths_(uint64_t(p.integer("light_paths", 1, 1 << 20))),
           memory_(uint64_t(p.integer("memory", 1, 1 << 30)) << 20),
           given_connections_(p.number("connections", 0, 1024)),
           record_fraction_(p.number("record_fraction", 0, 1)),
@@ -48,7 +49,10 @@ public:
     void learn(const LearnContext& pass) override { paths_.learn(pass); }
     void save(LearnedState& to) const override { paths_.save(to); }
     void load(LearnedState& from) override { paths_.load(from); }
-    void prepare(const PassContext& pass) override { paths_.train(pass); }
+    void prepare(const PassContext& pass) override {
+        paths_.train(pass);
+        paths_.decide_specular(pass, counts(pass.scene, pass.light_paths));
+    }
     void trace(const PassContext& pass) override {
         const TechniqueCounts n = counts(pass.scene, pass.light_paths);
         store_light_paths(pass, n);
@@ -66,6 +70,7 @@ public:
         for (int t = 2; t <= z.size(); ++t) {
             paths_.add_hits(c, n, t, work);  // C(0,t)
             if (!paths_.is_joinable(z, t)) continue;
+            paths_.add_specular(c, n, t, work);  // X(s,t)
             if (n.next_event > 0)
                 paths_.add(c, join_next_event(c.scene, z, t, c.sampler, n), work);  // C(1,t)
             if (vertices_.empty()) continue;
@@ -86,6 +91,7 @@ public:
         if (direct_ != Direct::NextEvent) n.connect_emission = n.connect;
         if (direct_ == Direct::Stored) n.next_event = 0;
         n.guide = paths_.guiding().guide();
+        n.specular_depth = paths_.specular().depth(scene);
         return n;
     }
     uint64_t light_paths(const Scene& scene) const override { return scene.film().pixel_count(); }
@@ -99,6 +105,7 @@ public:
             {"records", records_.size()},
             {"record_bytes", records_.memory_bytes()}};
         paths_.guiding().add_figures(figures);
+        paths_.specular().add_figures(figures);
         return figures;
     }
 
@@ -277,6 +284,7 @@ std::vector<ParamInfo> pcbpt_params() {
            "16."},
           {"uniform", ParamKind::Float, "0.5",
            "Fraction of connections that are drawn uniformly, in [0.001, 1]."}},
+         Specular::params(),
          Guiding::params(),
          {{"weights", ParamKind::String, "upper",
            "Count of a connection in the weights: upper (1, since all pixels share the light "

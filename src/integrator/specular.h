@@ -12,26 +12,45 @@ public:
     Specular() = default;
     explicit Specular(const IntegratorParams& params);
 
-    bool is_on() const { return depth_ > 0; }
-    /// TechniqueCounts::specular_depth.
-    int depth() const { return depth_; }
-    /// The hit with the weight that it has beside specular connections.
-    Join weighed_hit(const Join& hit, const Scene& scene, const SubPath& z, int t,
-                     const TechniqueCounts& counts) const {
+    /// With `specular_connections=auto`: decides before pass 0 whether the rendering uses them. `counts`: those of the
+    /// method where it does. For Integrator::prepare().
+    void decide(const PassContext& pass, const DepthOptions& depth, const TechniqueCounts& counts);
+    /// Whether decide() decides anything.
+    bool is_automatic() const { return mode_ == Mode::Auto; }
+    void save(LearnedState& to) const;
+    void load(LearnedState& from);
+    /// See Integrator::figures().
+    void add_figures(std::vector<std::pair<std::string, double>>& figures) const;
+
+    /// TechniqueCounts::specular_depth: 0 where the scene has nothing that a chain could consist of. Before decide(), that of
+    /// a rendering that uses them.
+    int depth(const Scene& scene) const { return is_used_ && scene.may_have_chains() ? depth_ : 0; }
+    /// Adds the hit, times `factor`, with the weight that it has beside specular connections.
+    static void add_hit(const SampleContext& c, const Join& hit, const SubPath& z, int t,
+                        const TechniqueCounts& counts, float factor = 1) {
+        if (counts.specular_depth == 0) return c.sink.add(hit, hit.contribution * factor);
         Join join = hit;
-        if (is_on()) join.mis_weight *= hit_beside_specular(scene, z, t, *hit.emitter, counts);
-        return join;
+        join.mis_weight *= hit_beside_specular(c.scene, z, t, *hit.emitter, counts);
+        c.sink.add(join, join.contribution * factor);
     }
-    /// The same for a hit of the lens, C(s+1,0).
-    void weigh_hit_lens(Join& hit, const Scene& scene, const SubPath& y, int s,
-                        const TechniqueCounts& counts) const {
-        if (is_on()) hit.mis_weight *= hit_lens_beside_specular(scene, y, s, counts);
+    /// Gives a hit of the lens, C(s+1,0), the weight that it has beside specular connections.
+    static void weigh_hit_lens(Join& hit, const Scene& scene, const SubPath& y, int s,
+                               const TechniqueCounts& counts) {
+        if (counts.specular_depth > 0)
+            hit.mis_weight *= hit_lens_beside_specular(scene, y, s, counts);
     }
-    /// Adds X(s,t) of z_{t-1}.
-    void add(const SampleContext& c, int t, int max_depth, const TechniqueCounts& counts,
-             Workspace& work) const;
+    /// Adds X(s,t) of z_{t-1}, where the counts have any. `threshold`: as SpecularLimits::threshold.
+    static void add(const SampleContext& c, int t, int max_depth, float threshold,
+                    const TechniqueCounts& counts, Workspace& work) {
+        const SpecularLimits limits{max_depth, threshold};
+        if (const auto j = join_specular(c.scene, work.z, t, limits, c.sampler, counts, work))
+            c.sink.add(*j, j->contribution);
+    }
 
 private:
+    enum class Mode : uint8_t { Off, On, Auto };
+    Mode mode_ = Mode::Off;
+    bool is_used_ = false;
     int depth_ = 0;
 };
 

@@ -2,8 +2,8 @@
 // dropped, and the other is joined by a shadow ray to the predecessor of the dropped one. Bernoulli trials estimate the
 // reciprocal of the probability that the pair was found.
 //
-// Techniques: U(s,t), for paths of three edges and more; `upg+bdpt` also has C(s,t). Unbiased for the paths it can
-// make. `upg` alone cannot make short paths, and paths where every vertex, or both of its neighbours, scatter by delta
+// Techniques: U(s,t), for paths of three edges and more; `upg+bdpt` also has C(s,t), and with specular_connections=on
+// X(s,t). Unbiased for the paths it can make. `upg` alone cannot make short paths, and paths where every vertex, or both of its neighbours, scatter by delta
 // events.
 
 #include "integrator/upg.h"
@@ -38,7 +38,8 @@ constexpr std::array<Choice<PairRule>, 4> kRules{{{"gloss", PairRule::Gloss},
 class UpgIntegrator final : public Integrator {
 public:
     UpgIntegrator(const IntegratorParams& p, bool connects)
-        : paths_(p, Guiding(p)), given_radius_(p.number("radius")), connects_(connects), light_(p),
+        : paths_(p, Guiding(p), connects ? Specular(p) : Specular()),
+          given_radius_(p.number("radius")), connects_(connects), light_(p),
           bound_(p.choice("bound", kBounds)),
           flatness_(bound_ == TrialBound::Slab ? kGatherConstants.flatness : 1.0f),
           rule_(p.choice("drop", kRules)) {
@@ -81,6 +82,7 @@ public:
 
     void prepare(const PassContext& pass) override {
         paths_.train(pass, GuidedWalks::BothWithPairs);
+        paths_.decide_specular(pass, counts(pass.scene, pass.light_paths));
         if (pass.film.passes() == 0) start(pass);
     }
     void trace(const PassContext& pass) override {
@@ -118,7 +120,8 @@ public:
             paths_.add_hits(c, n, t, work);  // C(0,t)
             if (!paths_.is_joinable(z, t)) continue;
             if (connects_) {
-                add_next_events(c, n, t, work);  // C(1,t)
+                paths_.add_specular(c, n, t, work);  // X(s,t)
+                add_next_events(c, n, t, work);      // C(1,t)
                 const PhaseTimer of_connections(work.stats, &PhaseSeconds::connections);
                 for (int s = 2; s <= y.size() && s + t - 1 <= paths_.max_depth(); ++s)
                     paths_.add(c, join_connect(c.scene, y, s, z, t, n), work);  // C(s,t)
@@ -141,6 +144,7 @@ public:
                    .min_edges = 3,
                    .rule = rule_};
         n.guide = paths_.guiding().guide();
+        n.specular_depth = paths_.specular().depth(scene);
         return n;
     }
     uint64_t light_paths(const Scene& scene) const override {
@@ -155,6 +159,7 @@ public:
             {"weight_scale", connects_ ? learned_.weight_scale.value() : 1}};
         if (connects_) figures.push_back({"next_events", learned_.next_events.value()});
         paths_.guiding().add_figures(figures);
+        paths_.specular().add_figures(figures);
         return figures;
     }
 
@@ -268,7 +273,7 @@ private:
     LightVertexGrid seen_grid_;  ///< Unused where both radii are equal.
 };
 
-std::vector<ParamInfo> upg_params() {
+std::vector<ParamInfo> upg_params(const std::vector<ParamInfo>& further = {}) {
     return concat(
         {Bidirectional::params(),
          {{"radius", ParamKind::Float, "0",
@@ -276,6 +281,7 @@ std::vector<ParamInfo> upg_params() {
            "eight pairs for each eye path; upg+bdpt then adapts it during the rendering, and uses "
            "a smaller one behind the first diffuse or glossy vertex."}},
          LightPathOptions::params(),
+         further,
          Guiding::params(),
          {{"bound", ParamKind::String, "slab",
            "Directions that Bernoulli trials propose: slab (pairs lie near the tangent plane), "
@@ -300,7 +306,8 @@ IntegratorEntry upg_entry() {
 
 IntegratorEntry upg_bdpt_entry() {
     return {{"integrator", "upg+bdpt",
-             "Unbiased photon gathering with bidirectional path tracing. Unbiased.", upg_params()},
+             "Unbiased photon gathering with bidirectional path tracing. Unbiased.",
+             upg_params(Specular::params())},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<UpgIntegrator>(p, true);
             }};

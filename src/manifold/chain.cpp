@@ -13,8 +13,7 @@ bool ChainTracer::advance() {
     const Vec3 d = to_float(ray_.d);
     Passage passage{medium_};
     ++stats_.chain_rays;
-    if (!scene_.find({offset_origin(origin_, d), d, kInf}, kOneMinusEpsilon, hit_, passage))
-        return false;
+    if (!scene_.find_certain({offset_origin(origin_, d), d, kInf}, hit_, passage)) return false;
     if (!may_be_in_chain(*hit_.shape)) return false;
     scene_.complete(hit_);
     const auto jet =
@@ -57,6 +56,7 @@ std::optional<Vec3d> ChainTracer::solve(Vec3d w, const ChainEvents& events, cons
     constexpr int kMostRays = 30;          // through the whole chain
     constexpr double kLongestStep = 0.25;  // radians
     constexpr double kLeastShare = 1.0 / 64;
+    constexpr double kRounding = 1e-12;  // of miss()
     Passing at = lamp.passed_by(ray);
     double share = 1;  // of the step
     for (int i = 1; i < kMostRays; ++i) {
@@ -64,14 +64,24 @@ std::optional<Vec3d> ChainTracer::solve(Vec3d w, const ChainEvents& events, cons
         const Matrix2& m = at.by_angles;
         const double det = m.determinant();
         double a = (at.y * m.a2 - at.x * m.b2) / det, b = (at.x * m.b1 - at.y * m.a1) / det;
-        const double size = std::hypot(a, b), most = share * kLongestStep / size;
+        const double size = std::hypot(a, b);
         if (!std::isfinite(size)) return {};
-        if (size > 0) a *= std::fmin(share, most), b *= std::fmin(share, most);
+        // Where rays are focused, as at the edge of a caustic, a ray that hardly misses may still be far from the solution.
+        const bool is_last = size < kStepOfSolutions && at.miss() < kMissOfSolutions;
+        if (!is_last && size > 0) {
+            const double factor = share * std::fmin(1, kLongestStep / size);
+            a *= factor, b *= factor;
+        }
         const TangentBasis basis(w);
         const Vec3d next = normalize(w + basis.s * a + basis.t * b);
-        const bool is_last = at.miss() < kMissOfSolutions;
         const bool follows = follow(next, events);
-        if (is_last) return follows ? std::optional(next) : std::nullopt;
+        if (is_last) {
+            if (!follows) return {};
+            const Passing end = lamp.passed_by(ray_);
+            const bool is_closer =
+                end.distance > 0 && end.miss() <= std::fmax(at.miss(), kRounding);
+            return is_closer ? std::optional(next) : std::nullopt;
+        }
         const Passing there = follows ? lamp.passed_by(ray_) : at;
         if (follows && there.distance > 0 && there.miss() < at.miss()) {
             w = next;
@@ -85,10 +95,9 @@ std::optional<Vec3d> ChainTracer::solve(Vec3d w, const ChainEvents& events, cons
 }
 
 float ChainTracer::visibility_of(const LampPoint& lamp) const {
-    ++stats_.shadow_rays;
+    ++stats_.chain_rays;
     const float Tr = lamp.is_infinite() ? scene_.transmittance_to_infinity(origin_, lamp.p)
                                         : scene_.transmittance(origin_, lamp.ray_end());
-    stats_.visible += Tr > 0;
     return Tr;
 }
 

@@ -49,12 +49,6 @@ struct LampPoint {
     }
 };
 
-/// Whether chains may have delta events at a surface. Maps of normals have no derivatives yet, and masks no certain
-/// events; their paths belong to hits alone.
-inline bool may_be_in_chain(const SceneShape& shape) {
-    return shape.material->is_opaque() && !shape.material->perturbs_normals();
-}
-
 /// Follows rays from one surface point through delta events.
 class ChainTracer {
 public:
@@ -80,10 +74,10 @@ public:
     /// Product of the coefficients of the events and of the transmittance of the edges before the ray.
     Rgb value() const { return value_; }
 
-    /// start(), and all events; false where one of them is not met.
+    /// Follows the ray along `w` through all events; false where one of them is not met.
     bool follow(Vec3d w, const ChainEvents& events);
     /// The direction near `w` whose ray passes through the lamp's point, behind the events; the tracer has followed it then. It is
-    /// a function of its arguments: found by one seed, it is found again by the same one. `ray`: that along w, behind the
+    /// a function of its arguments: found by one seed, it is found again by the same one. `ray`: the ray along `w` after its
     /// events.
     std::optional<Vec3d> solve(Vec3d w, const ChainEvents& events, const ChainRay& ray,
                                const LampPoint& lamp);
@@ -114,8 +108,8 @@ inline bool is_same_solution(Vec3d a, Vec3d b) {
     return dot(a - b, a - b) < kAngle * kAngle;
 }
 
-/// Newton's method ends where the ray misses the lamp by a smaller angle, seen from the last event, and one further step
-/// squares that.
-inline constexpr double kMissOfSolutions = 1e-7;
+/// Newton's method ends where the ray misses the lamp by a smaller angle, seen from the last event, and the step of the first
+/// direction is smaller, too, in radians. One further step squares that.
+inline constexpr double kMissOfSolutions = 1e-7, kStepOfSolutions = 1e-8;
 
 }  // namespace etendue

@@ -1,6 +1,8 @@
 #include "manifold/seeds.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 namespace etendue {
 
@@ -29,16 +31,31 @@ const ClearShape& ChainSeeds::choose_shape(float u) const {
     return shapes[std::min(i, shapes.size() - 1)];
 }
 
+std::optional<Vec3d> ChainSeeds::about_lamp(float u_angle, float u_around) const {
+    // Angles of all sizes: panes hardly turn light, balls and waves do.
+    constexpr double kSmallest = 0.005, kLargest = 1;
+    const Vec3d v = lamp_.is_infinite() ? Vec3d(lamp_.p) : Vec3d(lamp_.p) - Vec3d(from_.p);
+    if (!(dot(v, v) > 0)) return {};
+    const Vec3d to_lamp = normalize(v);
+    const double angle = kSmallest * std::pow(kLargest / kSmallest, double(u_angle)),
+                 around = 2 * std::numbers::pi * double(u_around);
+    const TangentBasis basis(to_lamp);
+    return normalize(to_lamp * std::cos(angle) +
+                     (basis.s * std::cos(around) + basis.t * std::sin(around)) * std::sin(angle));
+}
+
 std::optional<Vec3d> ChainSeeds::first_direction(Sampler& sampler) const {
-    constexpr float kShareOfShapes = 0.5f;
+    constexpr float kShareOfLamp = 0.4f, kShareOfShapes = 0.35f;
     const float u = sampler.next_1d(), u_lobe = sampler.next_1d();
     const Vec2 u_direction = sampler.next_2d();
-    if (scene_.clear_shapes().empty() || u >= kShareOfShapes) {
+    if (u < kShareOfLamp) return about_lamp(u_lobe, u_direction.x);
+    const float u_shape = (u - kShareOfLamp) / kShareOfShapes;
+    if (scene_.clear_shapes().empty() || u_shape >= 1) {
         const auto s = from_.sample_unguided(u_lobe, u_direction, TransportMode::Radiance);
         if (!s || s->is_delta) return {};
         return normalize(Vec3d(s->wi));
     }
-    const ClearShape& shape = choose_shape(u / kShareOfShapes);
+    const ClearShape& shape = choose_shape(u_shape);
     const Vec3d v = Vec3d(scene_.point_on(shape, u_lobe, u_direction)) - Vec3d(from_.p);
     if (!(dot(v, v) > 0)) return {};
     return normalize(v);

@@ -24,16 +24,17 @@ public:
     ChainSeeds(const Scene& scene, const Vertex& from, const LampPoint& lamp, int depth,
                ChainTracer& tracer, RenderStats& stats);
 
-    /// A walk leaves the eye vertex and goes on by delta events: in a direction of its own BSDF, without guide, or toward a
-    /// random point of a shape that has delta events alone. Of the chains that lead from the eye vertex to a surface on this
+    /// A walk leaves the eye vertex and goes on by delta events: in a direction of its own BSDF, without guide, in one about
+    /// the direction to the lamp's point, or toward a random point of a shape that has delta events alone. Of the chains that lead from the eye vertex to a surface on this
     /// walk, one is chosen uniformly among those from whose last surface the ray leaves on the side of the lamp's point,
-    /// which that surface sees. All that is asked of a seed is true near a solution, too, and directions of the BSDF reach
-    /// all solutions that contribute. So every solution that is not degenerate is found. Empty where the walk has no such
+    /// which that surface sees. Every condition on a seed also holds for the seeds near a solution, and directions of the BSDF reach
+    /// all solutions that contribute. So each solution that is not degenerate has a positive probability. Empty where the walk has no such
     /// chain, or the seed is known to have other events than `only`.
     std::optional<ChainSeed> draw(Sampler& sampler, const ChainEvents* only = nullptr);
 
 private:
     std::optional<Vec3d> first_direction(Sampler& sampler) const;
+    std::optional<Vec3d> about_lamp(float u_angle, float u_around) const;
     const ClearShape& choose_shape(float u) const;
     /// L_e |cos θ| of the lamp toward the surface that the tracer has left, if the chain may end there.
     Rgb emission_here() const;

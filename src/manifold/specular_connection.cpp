@@ -5,7 +5,7 @@ namespace {
 
 /// Weight of X against the hit: `ratio` is p̂ over the hit's density.
 double specular_weight(double ratio) {
-    return std::isfinite(ratio) ? sqr(ratio) / (1 + sqr(ratio)) : 1;
+    return std::isinf(ratio) ? 1 : sqr(ratio) / (1 + sqr(ratio));
 }
 
 /// p̂ over the density of the hit, both without the probabilities of the events, which they share. `pdf`: density of the
@@ -14,6 +14,18 @@ double density_ratio(const LampPoint& lamp, const ChainRay& ray, double jacobian
     const double cosine = lamp.is_infinite() ? 1 : std::fabs(dot(Vec3d(lamp.ng), ray.d));
     const double length = lamp.is_infinite() ? 1 : ray.way + lamp.passed_by(ray).distance;
     return kSolutionShare * spread(jacobian, length) * lamp.pdf / (pdf * jacobian * cosine);
+}
+
+/// x_0 of a path whose light leaves along `w`.
+LampPoint lamp_point(const Vertex& x0, const Emitter& emitter, Vec3 w) {
+    const EmitterHit e = x0.is_infinite ? emitter.eval_infinite(x0.p)
+                                        : emitter.eval_surface(x0.ng, x0.uv, x0.location.prim, w);
+    return {.emitter = &emitter,
+            .p = x0.p,
+            .ng = x0.ng,
+            .uv = x0.uv,
+            .prim = x0.location.prim,
+            .pdf = double(emitter.selection_pmf) * double(e.pdf_y0)};
 }
 
 /// Draws y_0; its density is 0 where it has none.
@@ -48,7 +60,7 @@ std::optional<Solution> evaluate(const Vertex& from, const LampPoint& lamp, Vec3
     if (emitted.is_zero()) return {};
     const double jacobian = lamp.passed_by(ray).jacobian();
     const Rgb C = from.beta * f.f * tracer.value() * emitted * float(jacobian / lamp.pdf);
-    if (C.is_zero() || !std::isfinite(luminance(C))) return {};
+    if (C.is_zero()) return {};
     const Rgb Tr = tracer.transmittance_to(lamp);
     if (Tr.is_zero()) return {};
     const double weight = lamp.emitter->is_delta()
@@ -57,11 +69,11 @@ std::optional<Solution> evaluate(const Vertex& from, const LampPoint& lamp, Vec3
     return Solution{w, events, C * Tr, weight};
 }
 
-/// Number of seeds until one leads to the solution. No cap: after ten million there is a defect, and 0 is returned.
+/// Number of seeds until one leads to the solution, at most `most`.
 uint64_t count_trials(const Solution& found, const LampPoint& lamp, ChainSeeds& seeds,
-                      ChainTracer& tracer, Sampler& sampler, Workspace& work) {
-    constexpr uint64_t kRunaway = 10'000'000, kSeldom = 1024;
-    for (uint64_t n = 1; n <= kRunaway; ++n) {
+                      ChainTracer& tracer, uint64_t most, Sampler& sampler, Workspace& work) {
+    constexpr uint64_t kSeldom = 1024;
+    for (uint64_t n = 1; n <= most; ++n) {
         if (n % kSeldom == 0) work.go_on();
         ++work.stats.chain_trials;
         const auto seed = seeds.draw(sampler, &found.events);
@@ -70,7 +82,7 @@ uint64_t count_trials(const Solution& found, const LampPoint& lamp, ChainSeeds& 
         if (w && is_same_solution(*w, found.w)) return n;
     }
     ++work.stats.runaways;
-    return 0;
+    return most;
 }
 
 /// Makes `y` the light side of the path, from y_0 on.
@@ -99,8 +111,9 @@ void record(const LampPoint& lamp, const Solution& found, ChainTracer& tracer, S
 /// Follows a known chain of a path, from its eye vertex to its lamp.
 class KnownChain {
 public:
-    KnownChain(const Scene& scene, Vec3 from, Vec3 to_first)
-        : scene_(scene), ray_(ChainRay::start(Vec3d(from), normalize(Vec3d(to_first)))) {}
+    /// `w`: direction of its first edge.
+    KnownChain(const Scene& scene, Vec3 from, Vec3 w)
+        : scene_(scene), ray_(ChainRay::start(Vec3d(from), normalize(Vec3d(w)))) {}
 
     /// Goes on to `v`, and leaves it by its event; `toward` is the direction there toward the eye. False where chains may
     /// not have it.
@@ -130,10 +143,11 @@ private:
 }  // namespace
 
 bool is_left_to_hits(const SubPath& z, int t, const TechniqueCounts& counts) {
-    if (counts.uses_pairs()) return false;
+    // Any vertex without delta event can be merged.
+    if (counts.merge > 0) return false;
     for (int i = t - 1; i > 0; --i) {
-        const bool is_split = (i == t - 1 || !z[i].is_delta) && !z[i - 1].is_delta;
-        if (is_split && (i == 1 ? counts.splat : counts.connect) > 0) return false;
+        const bool is_smooth_pair = (i == t - 1 || !z[i].is_delta) && !z[i - 1].is_delta;
+        if (is_smooth_pair && counts.makes_smooth_pairs(i == 1)) return false;
     }
     return true;
 }
@@ -157,14 +171,15 @@ std::optional<Join> join_specular(const Scene& scene, const SubPath& z, int t,
     const auto seed = seeds.draw(sampler);
     if (!seed) return {};
     // Russian roulette before Newton's method by what the path may contribute, and again when that is known.
-    // The guess may be far too low where light is focused.
+    // The guess may be far too low where light is focused. The numbers are drawn even where they are not needed, so that the
+    // trials do not depend on the threshold.
     constexpr float kLeast = 0.3f, kMargin = 3;
     const float film_weight = std::fabs(z.film_weight);
-    const auto survives = [&](float q) { return q >= 1 || sampler.next_1d() < q; };
+    const float u_before = sampler.next_1d(), u_after = sampler.next_1d();
     const Rgb f = from.eval_unguided(to_float(seed->w), TransportMode::Radiance).f;
     const float guess = luminance(from.beta * f * seed->guess) / float(lamp.pdf) * film_weight,
                 q_guess = std::fmax(kLeast, join_survival(kMargin * guess, limits.threshold));
-    if (!survives(q_guess)) return {};
+    if (!(u_before < q_guess)) return {};
     const auto w = tracer.solve(seed->w, seed->events, seed->ray, lamp);
     if (!w) return {};
     auto found = evaluate(from, lamp, *w, seed->events, tracer);
@@ -173,10 +188,11 @@ std::optional<Join> join_specular(const Scene& scene, const SubPath& z, int t,
     found->contribution *= 1 / q_guess;
     const float share = luminance(found->contribution) * float(found->weight) * film_weight,
                 q = join_survival(share, limits.threshold);
-    if (!survives(q)) return {};
+    if (!(u_after < q)) return {};
     found->contribution *= 1 / q;
     ++work.stats.chains;
-    const uint64_t trials = count_trials(*found, lamp, seeds, tracer, sampler, work);
+    const uint64_t trials =
+        count_trials(*found, lamp, seeds, tracer, limits.most_trials, sampler, work);
     if (work.is_observed) record(lamp, *found, tracer, work.pair);
     return Join{.technique = {Strategy::Specular, found->events.count + 1, t},
                 .emitter = lamp.emitter,
@@ -197,18 +213,11 @@ float hit_beside_specular(const Scene& scene, const SubPath& z, int t, const Emi
     if (from == 0 || events == 0 || events > counts.specular_depth) return 1;
     if (!is_left_to_hits(z, from + 1, counts)) return 1;
     const Vertex& end = z[last];
-    KnownChain chain(scene, z[from].p, z[from + 1].p - z[from].p);
+    // Directions of walks are more exact than differences of rounded positions.
+    KnownChain chain(scene, z[from].p, -z[from + 1].wo);
     for (int i = from + 1; i < last; ++i)
         if (!chain.pass(z[i], z[i].wo)) return 1;
-    const EmitterHit e = end.is_infinite
-                             ? emitter.eval_infinite(end.p)
-                             : emitter.eval_surface(end.ng, end.uv, end.location.prim, end.wo);
-    const LampPoint lamp{.emitter = &emitter,
-                         .p = end.p,
-                         .ng = end.ng,
-                         .uv = end.uv,
-                         .prim = end.location.prim,
-                         .pdf = double(emitter.selection_pmf) * double(e.pdf_y0)};
+    const LampPoint lamp = lamp_point(end, emitter, end.wo);
     const Vertex& first = z[from + 1];
     const double pdf = double(first.pdf_fwd) * double(length2(first.p - z[from].p)) /
                        double(abs_dot(first.ng, first.wo));
@@ -221,27 +230,19 @@ float hit_lens_beside_specular(const Scene& scene, const SubPath& y, int s,
     while (from < s && y[from].is_delta) ++from;
     const int events = from - 1;
     if (events == 0 || from >= s || events > counts.specular_depth) return 1;
-    // Of the rest, a splat or a connection makes the path where two vertices without delta event meet.
+    // As is_left_to_hits().
+    if (counts.merge > 0) return 1;
     for (int i = from; i < s; ++i) {
         const bool is_last = i + 1 == s;
-        if (y[i].is_delta || (!is_last && y[i + 1].is_delta)) continue;
-        if ((is_last ? counts.splat : counts.connect) > 0) return 1;
+        const bool is_smooth_pair = !y[i].is_delta && (is_last || !y[i + 1].is_delta);
+        if (is_smooth_pair && counts.makes_smooth_pairs(is_last)) return 1;
     }
     const Vertex& y0 = y[0];
-    if (y0.emitter->is_delta()) return 0;
-    KnownChain chain(scene, y[from].p, y[from - 1].p - y[from].p);
+    KnownChain chain(scene, y[from].p, y[from].wo);
     for (int i = from - 1; i > 0; --i)
-        if (!chain.pass(y[i], normalize(y[i + 1].p - y[i].p))) return 1;
-    const Vec3 w = direction(y0, y[1]);
-    const EmitterHit e = y0.is_infinite
-                             ? y0.emitter->eval_infinite(y0.p)
-                             : y0.emitter->eval_surface(y0.ng, y0.uv, y0.location.prim, w);
-    const LampPoint lamp{.emitter = y0.emitter,
-                         .p = y0.p,
-                         .ng = y0.ng,
-                         .uv = y0.uv,
-                         .prim = y0.location.prim,
-                         .pdf = double(y0.emitter->selection_pmf) * double(e.pdf_y0)};
+        if (!chain.pass(y[i], -y[i + 1].wo)) return 1;
+    if (y0.emitter->is_delta()) return 0;
+    const LampPoint lamp = lamp_point(y0, *y0.emitter, -y[1].wo);
     return chain.rest_beside(lamp, double(y[from - 1].pdf_rev) / double(y[from].to_predecessor));
 }
 

@@ -4,7 +4,7 @@
 // which a seed leads to the chain is unknown. So its contribution is multiplied by the number of seeds until one leads to
 // the chain again, whose mean is 1/P [Booth 2007]. Unbiased.
 //
-// X makes those paths of its method that otherwise hits alone make. Their weights cannot use P. They use
+// X is used only for paths that no technique of the method but hits makes. Their weights cannot use P. They use
 // p̂ = c p(y_0) J Π P_j instead, with a constant c, the spread J ≤ 1 of the chain, and the probabilities P_j of the events,
 // which are those of a hit, too.
 
@@ -25,8 +25,10 @@ inline double spread(double jacobian, double length) {
 
 struct SpecularLimits {
     int max_depth;  ///< Most edges of a path.
-    /// Expected contributions to the pixel of a smaller luminance pass Russian roulette before the trials.
+    /// Searches whose expected contribution to the pixel has a smaller luminance are subject to Russian roulette; 0: none.
     float threshold = 0;
+    /// Where a search takes more, this number is taken instead: the contribution is then too small, which is counted.
+    uint64_t most_trials = 10'000'000;
 };
 
 /// Whether paths whose eye path begins with z_0 … z_{t-1}, and goes on from there by delta events to a lamp, are made by hits alone
@@ -42,7 +44,7 @@ std::optional<Join> join_specular(const Scene& scene, const SubPath& z, int t,
 /// Factor of the weight of C(0,t), the hit of `emitter` at z_{t-1}: 1 where no specular connection makes the path.
 float hit_beside_specular(const Scene& scene, const SubPath& z, int t, const Emitter& emitter,
                           const TechniqueCounts& counts);
-/// The same of C(s+1,0), the hit of the lens by a ray from y_{s-1}.
+/// Factor of the weight of C(s+1,0), the hit of the lens by a ray from y_{s-1}.
 float hit_lens_beside_specular(const Scene& scene, const SubPath& y, int s,
                                const TechniqueCounts& counts);
 

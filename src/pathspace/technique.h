@@ -134,6 +134,11 @@ struct TechniqueCounts {
                gather > 0;
     }
     bool uses_pairs() const { return merge > 0 || gather > 0; }
+    /// Whether a technique other than hits makes all paths with two neighbouring vertices that scatter by smooth lobes;
+    /// `at_lens`: whether one of the two is the lens instead.
+    bool makes_smooth_pairs(bool at_lens) const {
+        return at_lens ? splat > 0 : connect > 0 || gather > 0;
+    }
     /// Number of gathers at each inner vertex of a path of `edges` edges.
     float gathers(int edges) const { return edges < pairs.min_edges ? 0.0f : gather; }
     /// Count of gathers in MIS weights at an x_m of this level. All pairs of an eye vertex share its eye path. If the film

@@ -15,10 +15,10 @@ std::vector<std::string> warnings(const RenderStats& stats) {
         all.push_back(
             fmt::format("{} contributions were not finite and were left out", stats.rejected));
     if (stats.runaways > 0)
-        all.push_back(
-            fmt::format("{} pairs of vertices were abandoned after too many trials: their light is "
-                        "missing, and the image is darker than it should be",
-                        stats.runaways));
+        all.push_back(fmt::format("{} pairs of vertices or specular connections were abandoned "
+                                  "after too many trials: their light is "
+                                  "missing, and the image is darker than it should be",
+                                  stats.runaways));
     if (stats.bounds_exceeded > 0)
         all.push_back(fmt::format(
             "{} trials met a density above its assumed bound: the image may be biased there; "

@@ -315,8 +315,9 @@ private:
         a = Accelerator(options_.accelerator);
         const auto add_bounds = [&](const SceneShape& s, const Bounds3& bounds, uint32_t instance) {
             scene_.bounds_.extend(bounds);
-            if (!s.material->may_be_smooth() && s.material->is_opaque() &&
-                !s.material->perturbs_normals() && s.shape->primitive_count() > 0)
+            if (!may_be_in_chain(s) || s.shape->primitive_count() == 0) return;
+            scene_.may_have_chains_ |= s.material->may_have_delta();
+            if (!s.material->may_be_smooth())
                 scene_.clear_shapes_.push_back(
                     {s.shape, instance, bounds.center(), bounds.radius()});
         };

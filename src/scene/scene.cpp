@@ -201,7 +201,9 @@ void Scene::prefetch_images(const SurfaceHit& hit) const {
         image->prefetch({g.uv, g.color, g.p, {}, {}, g.alpha, g.second_uv});
 }
 
-bool Scene::find(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const {
+template <class Stops>
+bool Scene::find_where(const Ray& ray, const Stops& stops, SurfaceHit& hit,
+                       Passage& passage) const {
     if (!has_masks_) {
         const bool found = locate(ray, hit);
         if (passage.medium != kVacuum)
@@ -221,13 +223,11 @@ bool Scene::find(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) con
             return found;
         },
         [&](const SurfaceHit& next) {
-            const float opacity = opacity_of(*next.shape, next.geometry);
-            found = u < opacity;
+            found = stops(opacity_of(*next.shape, next.geometry));
             if (found) {
                 hit = next;
                 return false;
             }
-            u = std::min((u - opacity) / (1 - opacity), kOneMinusEpsilon);
             passage.medium = medium_beyond(next, ray.d, passage.medium);
             return true;
         });
@@ -235,6 +235,27 @@ bool Scene::find(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) con
         hit.t = travelled;
     else
         passage.attenuation *= attenuation(passage.medium, kInf);
+    return found;
+}
+
+bool Scene::find(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const {
+    const auto stops = [&](float opacity) {
+        if (u < opacity) return true;
+        u = std::min((u - opacity) / (1 - opacity), kOneMinusEpsilon);
+        return false;
+    };
+    return find_where(ray, stops, hit, passage);
+}
+
+bool Scene::find_certain(const Ray& ray, SurfaceHit& hit, Passage& passage) const {
+    float Tr = 1;
+    const auto stops = [&](float opacity) {
+        if (opacity >= 1) return true;
+        Tr *= 1 - opacity;
+        return false;
+    };
+    const bool found = find_where(ray, stops, hit, passage);
+    passage.attenuation *= Tr;
     return found;
 }
 

@@ -51,6 +51,12 @@ struct SceneShape {
     MediumId medium_toward(Vec3 ng, Vec3 d) const { return dot(ng, d) < 0 ? interior : exterior; }
 };
 
+/// Whether specular connections may have delta events at a surface. Maps of normals have no derivatives yet, and masks no
+/// certain events; their paths are left to hits.
+inline bool may_be_in_chain(const SceneShape& shape) {
+    return shape.material->is_opaque() && !shape.material->perturbs_normals();
+}
+
 /// A shape whose material has delta events alone, or one of those of an instance.
 struct ClearShape {
     const Shape* shape;
@@ -113,6 +119,9 @@ public:
     /// several rays can ask for the memory that complete() reads: first prefetch_primitive(), then prefetch_vertices(),
     /// which reads what the former asked for; and after it for what the material reads.
     bool find(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const;
+    /// Like find(), but the ray passes all surfaces that are not certain to stop it, and `passage.attenuation` has their
+    /// factors 1 - opacity, too.
+    bool find_certain(const Ray& ray, SurfaceHit& hit, Passage& passage) const;
     void complete(SurfaceHit& hit) const;
     void prefetch_primitive(const SurfaceHit& hit) const {
         if (const TriangleMesh* mesh = hit.shape->mesh()) mesh->prefetch_face(hit.location.prim);
@@ -128,6 +137,8 @@ public:
     std::optional<SurfaceJet> jet(const SurfaceLocation& location, Vec3d o, Vec3d d,
                                   double near) const;
     const std::vector<ClearShape>& clear_shapes() const { return clear_shapes_; }
+    /// Whether any surface may reflect or refract by delta events that chains may have, see may_be_in_chain().
+    bool may_have_chains() const { return may_have_chains_; }
     /// A point of a clear shape: `u_prim` chooses a primitive uniformly, and `u` a point of it.
     Vec3 point_on(const ClearShape& clear, float u_prim, Vec2 u) const;
     /// Probability that a ray meets the surface there.
@@ -214,6 +225,9 @@ private:
     };
     Scene(const Scene&);  ///< Shares what the other one owns.
     bool locate(const Ray& ray, SurfaceHit& hit) const;
+    /// find(), where `stops(opacity)` decides which masked surfaces stop the ray.
+    template <class Stops>
+    bool find_where(const Ray& ray, const Stops& stops, SurfaceHit& hit, Passage& passage) const;
     Ray segment(const RayEnd& a, const RayEnd& b) const;
     float masked_transmittance(const Ray& ray) const;
     Rgb attenuation(MediumId medium, const Ray& ray) const;
@@ -227,6 +241,7 @@ private:
     std::shared_ptr<Owned> owned_;
     std::vector<SceneShape> shapes_;  ///< By the accelerator's shape index.
     std::vector<ClearShape> clear_shapes_;
+    bool may_have_chains_ = false;
     std::vector<Rgb> media_;  ///< Extinction σ_t, 1/length.
     std::vector<const Emitter*> infinite_;
     AliasTable selection_;

@@ -57,7 +57,9 @@ CommonClasses::CommonClasses(const RunSeries& method, std::span<const RunSeries>
             const bool is_reachable =
                 can_make(method.counts, c) && can_make(references[i].counts, c);
             if (!is_reachable && k.is_reachable) continue;
-            found.implied = implies_[i] ? implied_by(i, found.reference) : found.method;
+            const bool is_implied = implies_[i] && !makes_by_specular(method.counts, c) &&
+                                    !makes_by_specular(references[i].counts, c);
+            found.implied = is_implied ? implied_by(i, found.reference) : found.method;
             const bool is_common =
                 is_reachable && found.effective_count() >= WelchTest::kEnoughContributions;
             double its_error = 0;
@@ -77,7 +79,7 @@ CommonClasses::CommonClasses(const RunSeries& method, std::span<const RunSeries>
             k.is_reachable = is_reachable;
             k.is_common = is_common;
             k.reference = i;
-            k.is_implied = implies_[i];
+            k.is_implied = is_implied;
             k.found = found;
             error = its_error;
         }

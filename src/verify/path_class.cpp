@@ -102,14 +102,19 @@ std::string to_string(const PathClass& c) {
 bool can_make(const TechniqueCounts& counts, const Technique& q, const PathClass& c) {
     if (!(counts.of(q) > 0) || !can_make(q, c)) return false;
     if (q.strategy != Strategy::Specular) return true;
-    // It is used where nothing but hits makes the path.
-    if (counts.uses_pairs()) return false;
+    // It is used where nothing but hits makes the path, as is_left_to_hits().
+    if (counts.merge > 0) return false;
     for (int i = q.s; i < c.edges; ++i) {
-        const bool is_lens = i + 1 == c.edges;
-        const bool is_split = (c.delta_events & (3u << i)) == 0;
-        if (is_split && (is_lens ? counts.splat : counts.connect) > 0) return false;
+        const bool is_smooth_pair = (c.delta_events & (3u << i)) == 0;
+        if (is_smooth_pair && counts.makes_smooth_pairs(i + 1 == c.edges)) return false;
     }
     return true;
+}
+
+bool makes_by_specular(const TechniqueCounts& counts, const PathClass& c) {
+    for (int s = 2; s < c.edges; ++s)
+        if (can_make(counts, {Strategy::Specular, s, c.edges + 1 - s}, c)) return true;
+    return false;
 }
 
 bool can_make(const TechniqueCounts& counts, const PathClass& c) {

@@ -58,6 +58,8 @@ bool can_make(const Technique& technique, const PathClass& c);
 int times_made(const Technique& technique, const PathClass& c, PairRule rule);
 /// The same where the technique is one of a method with these counts, which may leave classes to other techniques.
 bool can_make(const TechniqueCounts& counts, const Technique& technique, const PathClass& c);
+/// Whether a specular connection of the method makes paths of the class.
+bool makes_by_specular(const TechniqueCounts& counts, const PathClass& c);
 /// Whether any technique with a positive count can make paths of the class.
 bool can_make(const TechniqueCounts& counts, const PathClass& c);
 

@@ -44,8 +44,11 @@ IntegratorSpec without_roulette(IntegratorSpec spec, int longest) {
 
 /// Russian roulette before shadow rays depends on the weighted contribution. Unweighted contributions of a technique
 /// with small weights become rare and unbounded. Therefore techniques are rendered without it. Empty where `spec` has
-/// none.
+/// none, as `path` without specular connections.
 std::optional<IntegratorSpec> without_join_roulette(IntegratorSpec spec) {
+    const auto specular = spec.params.find("specular_connections");
+    if (spec.name == "path" && (specular == spec.params.end() || specular->second == "off"))
+        return {};
     for (const IntegratorEntry& e : integrator_registry())
         for (const ParamInfo& p : e.info.params)
             if (e.info.name == spec.name && p.name == std::string("roulette") &&

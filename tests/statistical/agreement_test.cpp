@@ -260,7 +260,7 @@ TEST_P(SpecularAgreement, WithPathTracing) {
     const AgreementCase& c = GetParam();
     const Scene scene = build(c.xml);
     const Tiles path = render_tiles(scene, "path:rr_depth=20,max_depth=8", {8 * c.passes, 4, 1});
-    for (const std::string method : {"path", "bdpt"})
+    for (const std::string method : {"path", "bdpt", "pcbpt", "upg+bdpt"})
         expect_same_image(render_tiles(scene,
                                        method + ":rr_depth=20,max_depth=8,specular_connections=on",
                                        {2 * c.passes, 4, 2}),

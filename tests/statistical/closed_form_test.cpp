@@ -519,21 +519,29 @@ double irradiance_below_pane(double aside, double above, double width, double& c
 }
 
 TEST(SpecularConnections, PointLightBehindAPane) {
-    const Scene scene =
-        build(camera_above("perspective", 1) + floor_of(kFloor) +
-              "<shape type=\"cube\"><transform name=\"to_world\"><scale x=\"9\" y=\"9\" "
-              "z=\"0.25\"/><translate z=\"3\"/></transform><bsdf type=\"dielectric\">" +
-              kPlainGlass + "</shape>" + point_light("0.3,-0.2,4"));
-    expect_image(
-        scene, {"path:max_depth=4" + kSpecular}, 8192,
-        [](float x, float y) {
-            const Vec3 p = on_plane(1, x, y);
-            double cos;
-            const double E = irradiance_below_pane(std::hypot(p.x - 0.3, p.y + 0.2), 4, 0.5, cos);
-            const float T = 1 - fresnel_dielectric(float(cos), kGlassEta).R;
-            return kFloor * Rgb(3, 2, 1) * (float(E) * sqr(T) * kInvPi);
-        },
-        0.03);
+    // Below the pane, nothing, or a mask that half of the light passes.
+    const std::string mask =
+        rectangle("<scale value=\"9\"/><translate z=\"2.4\"/>",
+                  "<bsdf type=\"mask\"><float name=\"opacity\" value=\"0.5\"/>" + lambert(Rgb(0)) +
+                      "</bsdf>");
+    for (const auto& [below, share] : {std::pair(std::string(), 1.0f), {mask, 0.5f}}) {
+        const Scene scene =
+            build(camera_above("perspective", 1) + floor_of(kFloor) +
+                  "<shape type=\"cube\"><transform name=\"to_world\"><scale x=\"9\" y=\"9\" "
+                  "z=\"0.25\"/><translate z=\"3\"/></transform><bsdf type=\"dielectric\">" +
+                  kPlainGlass + "</shape>" + below + point_light("0.3,-0.2,4"));
+        expect_image(
+            scene, {"path:max_depth=4" + kSpecular}, 8192,
+            [&, share = share](float x, float y) {
+                const Vec3 p = on_plane(1, x, y);
+                double cos;
+                const double E =
+                    irradiance_below_pane(std::hypot(p.x - 0.3, p.y + 0.2), 4, 0.5, cos);
+                const float T = 1 - fresnel_dielectric(float(cos), kGlassEta).R;
+                return kFloor * Rgb(3, 2, 1) * (share * float(E) * sqr(T) * kInvPi);
+            },
+            0.03);
+    }
 }
 
 /// The image of the light in a mirror, and the light itself.

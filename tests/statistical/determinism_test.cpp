@@ -86,6 +86,7 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Combine(
         ::testing::Values(
             "path", "light", "bdpt", "bdpt:eorr=true", "pcbpt", "vcm", "vcm:exact=true", "upg+bdpt",
+            "path:specular_connections=on", "upg+bdpt:specular_connections=auto",
             "path:guide=on,guide_roulette=false,guide_walks=3000",
             "bdpt:guide=hp02,guide_walks=3000", "upg+bdpt:guide=on,guide_walks=3000", "sppm",
             "ppm:eye_paths=2", "pm:light_paths=2000",

@@ -2,6 +2,8 @@
 
 #include "manifold/seeds.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -176,6 +178,62 @@ TEST_P(Chains, SolutionsAreIsolated) {
 
 INSTANTIATE_TEST_SUITE_P(Objects, Chains, ::testing::ValuesIn(cases()),
                          [](const auto& p) { return std::string(p.param.name); });
+
+// At the edge of a caustic two solutions meet, and Newton's method converges slowly. All seeds must still end at one of the
+// solutions: else each of their ends would count as a solution of its own.
+TEST(CausticEdge, SeedsEndAtSolutions) {
+    const Scene scene = scene_of(test::sphere("0,0,0", "0.5", test::kGlass));
+    Vertex v;
+    ComponentArena arena;
+    RenderStats stats;
+    set_floor_vertex(scene, {0, -1, 0}, v, arena);
+    ChainTracer tracer(scene, v, stats);
+    Sampler sampler(SamplerKind::Independent, 3);
+    sampler.start(0, 0);
+    sampler.seek(Stream::Auxiliary, 0);
+    ChainEvents through;
+    LampPoint lamp = lamp_of(scene);
+    const auto direction = [](double theta) { return Vec3d{std::sin(theta), std::cos(theta), 0}; };
+    // Where the ray leaves through the ball, and crosses the lamp's height.
+    const auto crossing = [&](double theta) {
+        tracer.follow(direction(theta), through);
+        const ChainRay& r = tracer.ray();
+        return r.o.x + r.d.x * (double(lamp.p.y) - r.o.y) / r.d.y;
+    };
+    for (ChainSeeds seeds(scene, v, lamp, 4, tracer, stats); through.count != 2;)
+        if (const auto seed = seeds.draw(sampler)) through = seed->events;
+    int ends = 0;
+    for (int i = 0; i < 12; ++i) {
+        lamp.p = {0, 1.2f + 0.01f * float(i), 0};
+        // The edge: the largest crossing of rays that were refracted to the other side of the axis and back.
+        double low = 0.1, high = 0.4;
+        for (int k = 0; k < 100; ++k) {
+            const double a = low + (high - low) / 3, b = high - (high - low) / 3;
+            (crossing(a) < crossing(b) ? low : high) = crossing(a) < crossing(b) ? a : b;
+        }
+        // Around it, by steps of single precision.
+        const auto edge = float(crossing(low));
+        for (const float inward : {1e-7f, 3e-7f, 1e-6f, 1e-5f}) {
+            lamp.p.x = edge - inward;
+            ChainSeeds seeds(scene, v, lamp, 4, tracer, stats);
+            std::vector<Vec3d> found;
+            for (int k = 0; k < 2000; ++k) {
+                const auto seed = seeds.draw(sampler);
+                if (!seed || !(seed->events == through)) continue;
+                const auto w = tracer.solve(seed->w, seed->events, seed->ray, lamp);
+                if (!w) continue;
+                ++ends;
+                ASSERT_TRUE(tracer.follow(*w, through));
+                EXPECT_LT(lamp.passed_by(tracer.ray()).miss(), kMissOfSolutions);
+                if (std::none_of(found.begin(), found.end(),
+                                 [&](Vec3d o) { return is_same_solution(o, *w); }))
+                    found.push_back(*w);
+            }
+            EXPECT_LE(found.size(), 3u) << lamp.p.y << ' ' << inward;
+        }
+    }
+    EXPECT_GT(ends, 1000);
+}
 
 /// Jacobian of the chain from a point of the floor to `lamp`, from the first seed that leads there with `count` events.
 double jacobian(const Scene& scene, Vec3 at, const LampPoint& lamp, int count) {

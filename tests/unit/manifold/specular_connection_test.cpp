@@ -2,6 +2,8 @@
 
 #include "manifold/specular_connection.h"
 
+#include <array>
+
 #include <gtest/gtest.h>
 
 #include "pathspace/path_pdfs.h"
@@ -59,13 +61,21 @@ double jacobian_of_differences(const Scene& scene, const Vertex& from, Vec3d w,
     return 1 / std::fabs(dot(a, last.s) * dot(b, last.t) - dot(a, last.t) * dot(b, last.s));
 }
 
-class SpecularWeights : public ::testing::TestWithParam<std::tuple<SpecularCase, bool>> {};
+/// What makes paths beside specular connections, hits and next events.
+enum class Beside { Nothing, Connections, Gathers };
+
+class SpecularWeights : public ::testing::TestWithParam<std::tuple<SpecularCase, Beside>> {};
 
 TEST_P(SpecularWeights, AreThoseOfTheDefinition) {
-    const auto& [test_case, has_connections] = GetParam();
+    const auto& [test_case, beside_it] = GetParam();
+    const bool has_connections = beside_it != Beside::Nothing;
     const Scene scene = test::build(test_case.xml);
     TechniqueCounts counts{.hit = 1, .next_event = 1, .specular_depth = 4};
     if (has_connections) counts.connect = 1, counts.splat = kPixels * kPixels;
+    if (beside_it == Beside::Gathers) {
+        counts.gather = kPixels * kPixels;
+        counts.pairs = {.disc = 0.05f, .inner_disc = 0.02f, .min_edges = 3};
+    }
     const Film film(scene.film(), scene.filter());
     Workspace work;
     work.is_observed = true;
@@ -148,12 +158,81 @@ TEST_P(SpecularWeights, AreThoseOfTheDefinition) {
     EXPECT_GT(compared, has_connections ? 3 : 50);
 }
 
+std::string case_name(const ::testing::TestParamInfo<std::tuple<SpecularCase, Beside>>& p) {
+    constexpr const char* kNames[] = {"", "_beside_connections", "_beside_gathers"};
+    return std::string(std::get<0>(p.param).name) + kNames[int(std::get<1>(p.param))];
+}
+
 INSTANTIATE_TEST_SUITE_P(Scenes, SpecularWeights,
-                         ::testing::Combine(::testing::ValuesIn(weight_cases()), ::testing::Bool()),
-                         [](const auto& p) {
-                             return std::string(std::get<0>(p.param).name) +
-                                    (std::get<1>(p.param) ? "_beside_connections" : "");
-                         });
+                         ::testing::Combine(::testing::ValuesIn(weight_cases()),
+                                            ::testing::Values(Beside::Nothing, Beside::Connections,
+                                                              Beside::Gathers)),
+                         case_name);
+
+/// So that a sample with many trials is replayed with the same ones, whatever roulette there was.
+TEST(SpecularTrials, DoNotDependOnRoulette) {
+    const Scene scene = test::build(test::lantern_room(test::front_camera(kPixels)));
+    const TechniqueCounts counts{.hit = 1, .next_event = 1, .specular_depth = 4};
+    const Film film(scene.film(), scene.filter());
+    Workspace work;
+    const WalkContext walk{scene, counts, work.stats, {6, 10}};
+    Sampler sampler(SamplerKind::Independent, 5);
+    int compared = 0, ended = 0;
+    for (uint64_t i = 0; i < 80 * kPixels * kPixels; ++i) {
+        sampler.start(0, i);
+        trace_eye_path(walk, film, i % (kPixels * kPixels), sampler, work.z);
+        for (int t = 2; t <= work.z.size(); ++t) {
+            std::array<uint64_t, 2> trials{};
+            std::array<bool, 2> found{};
+            for (const size_t k : {0, 1}) {
+                const uint64_t before = work.stats.chain_trials;
+                const SpecularLimits limits{.max_depth = 20, .threshold = k == 0 ? 0.0f : 1.0f};
+                found[k] =
+                    join_specular(scene, work.z, t, limits, sampler, counts, work).has_value();
+                trials[k] = work.stats.chain_trials - before;
+            }
+            ended += found[0] && !found[1];
+            if (!found[0] || !found[1]) continue;
+            EXPECT_EQ(trials[0], trials[1]);
+            ++compared;
+        }
+    }
+    EXPECT_GT(compared, 20);
+    EXPECT_GT(ended, 20) << "nothing was subject to roulette";
+}
+
+/// Light of a point that no specular connection can make is all left to hits of the lens.
+TEST(SpecularWeightsOfLensHits, AreOneBehindBumps) {
+    const std::string bumped =
+        "<bsdf type=\"bumpmap\"><texture type=\"checkerboard\"><transform "
+        "name=\"to_uv\"><scale value=\"3\"/></transform></texture><float name=\"scale\" "
+        "value=\"0.2\"/>" +
+        test::kGlass + "</bsdf>";
+    const Scene scene = test::build(
+        test::lens_camera(kPixels) + test::room() + test::sphere("0,0.3,0.1", "0.45", bumped) +
+        test::rectangle("<translate z=\"-0.98\"/>",
+                        "<bsdf type=\"twosided\"><bsdf type=\"conductor\"/></bsdf>") +
+        "<emitter type=\"point\"><point name=\"position\" value=\"0,0.3,0.1\"/></emitter>");
+    const TechniqueCounts counts{.hit = 1,
+                                 .next_event = 1,
+                                 .connect = 1,
+                                 .splat = kPixels * kPixels,
+                                 .hit_lens = kPixels * kPixels,
+                                 .specular_depth = 4};
+    Workspace work;
+    const WalkContext walk{scene, counts, work.stats, {6, 10}};
+    Sampler sampler(SamplerKind::Independent, 5);
+    int chains = 0;
+    for (uint64_t i = 0; i < 2000; ++i) {
+        sampler.start(0, i);
+        trace_light_path(walk, sampler, work.y);
+        for (int s = 2; s < work.y.size(); ++s) {
+            chains += work.y[1].is_delta && !work.y[s - 1].is_delta && work.y[s].is_delta;
+            EXPECT_EQ(hit_lens_beside_specular(scene, work.y, s + 1, counts), 1);
+        }
+    }
+    EXPECT_GT(chains, 50);
+}
 
 }  // namespace
 }  // namespace etendue

@@ -23,6 +23,7 @@ inline const std::vector<const char*>& resumable_methods() {
         "light:guide=on,guide_walks=2000",
         "bdpt",
         "bdpt:eorr=true",
+        "bdpt:specular_connections=auto",
         "bdpt:guide=on,guide_walks=2000",
         "vcm:radius=0.3",
         "vcm:exact=true",

@@ -22,7 +22,8 @@ TEST(Warnings, SayHowManyContributionsAreMissing) {
     stats.runaways = 4;
     stats.bounds_exceeded = 5;
     ASSERT_EQ(warnings(stats).size(), 3u);
-    EXPECT_TRUE(warnings(stats)[1].starts_with("4 pairs of vertices were abandoned"));
+    EXPECT_TRUE(warnings(stats)[1].starts_with(
+        "4 pairs of vertices or specular connections were abandoned"));
     EXPECT_TRUE(warnings(stats)[2].starts_with("5 trials met a density above its assumed bound"));
 }
 

@@ -50,6 +50,23 @@ TEST(CommonClasses, LostClassIsADeviation) {
     EXPECT_GT(report.lengths[1].comparison.p, 1e-3);
 }
 
+/// A number of trials has no bound: bright contributions may be few.
+TEST(CommonClasses, NothingIsImpliedOfSpecularConnections) {
+    TechniqueCounts with_specular = kPath;
+    with_specular.specular_depth = 4;
+    // The next event makes another class, which is implied as ever.
+    const PathClass next_event{.edges = 4, .delta_events = 0b0100};
+    for (const bool is_method : {true, false}) {
+        const std::vector<RunSeries> references{series("path", is_method ? kPath : with_specular,
+                                                       {{kCaustic, 300}, {next_event, 300}})};
+        const RunSeries method =
+            series("other", is_method ? with_specular : kPath, {{kDirect, 1000}});
+        const CommonClasses common(method, references);
+        EXPECT_FALSE(common.contains(kCaustic)) << is_method;
+        EXPECT_TRUE(common.contains(next_event)) << is_method;
+    }
+}
+
 /// The reference has too few contributions to imply enough for the method: a tenth of 30 in each of 32 runs.
 TEST(CommonClasses, LostClassIsTooRareWhereTheReferenceFindsItSeldom) {
     const std::vector<RunSeries> references{

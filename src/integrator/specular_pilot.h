@@ -1,0 +1,32 @@
+#pragma once
+// Some walks before the first pass, which tell whether specular connections are worth their time.
+
+#include "integrator/integrator.h"
+
+namespace etendue {
+
+/// Result of run_specular_pilot(): sums over the walks.
+struct SpecularPilot {
+    double light = 0;  ///< Contributions.
+    double light_of_none =
+        0;  ///< Of these, what nothing else makes: light of lamps without extent.
+    /// Second moments of the contributions without and with specular connections, relative to the square of the brightness of
+    /// their part of the image.
+    double moment_without = 0, moment_with = 0;
+    double moment_of_hits =
+        0;  ///< Part of moment_without: of hits of paths that a specular connection may make.
+    double rays_without = 0, rays_with = 0;
+
+    bool is_worthwhile() const {
+        constexpr double kLeastShare = 0.01;
+        if (light_of_none > kLeastShare * light) return true;
+        return moment_of_hits > kLeastShare * moment_without &&
+               moment_with * rays_with < moment_without * rays_without;
+    }
+};
+
+/// Walks with random numbers that no pass uses. `counts` has specular connections.
+SpecularPilot run_specular_pilot(const PassContext& pass, const DepthOptions& depth,
+                                 const TechniqueCounts& counts);
+
+}  // namespace etendue
