@@ -184,12 +184,19 @@ TechniqueReport compare_technique(const Technique& q, const Sides& sides,
                     if (is_of_technique(e) && e.path_class == c) sum += e.alone.sum;
                 return sum;
             })));
+    /// Sums over the contributions of a reference that has the technique, too: the light, and the second moment of what the
+    /// technique alone contributes, or less.
+    struct Expected {
+        double sum = 0, squares = 0;
+    };
+    std::map<PathClass, double> most_counts;  // effective counts of the technique, at most
     double length_total = 0;
     for (const auto& [c, k] : sides.common.all())
         if (c.edges + 1 == q.vertices()) length_total += k.light;
     for (size_t i = 0; i < sides.references.size(); ++i) {
         // A reference with this technique, and at most the same count, implies how many contributions the method has.
         const RunSeries& reference = sides.references[i];
+        std::map<PathClass, Expected> expected;
         const bool has_it = reference.counts.of(q) > 0 &&
                             reference.counts.of(q) <= sides.method.counts.of(q) &&
                             sides.common.may_serve(i) && !sides.method.has_chains;
@@ -201,7 +208,25 @@ TechniqueReport compare_technique(const Technique& q, const Sides& sides,
                 if (has_it && is_of_technique(e))
                     found[e.path_class].implied +=
                         sides.common.implied_by(i, e.alone).from_fewer_samples(fewer);
+                if (has_it && !reference.counts.uses_pairs() && reference_of(e.path_class)) {
+                    Expected& x = expected[e.path_class];
+                    x.sum += e.weighted.sum;
+                    x.squares += e.technique == q ? e.of_alone.own : e.of_alone.others;
+                }
             }
+        // Contributions that are too rare for the method to have had any do not show in its own count.
+        const double more_samples = double(unthinned.samples()) / double(reference.samples()) *
+                                    double(sides.method.counts.of(q) / reference.counts.of(q));
+        for (const auto& [c, x] : expected) {
+            if (!(x.squares > 0)) continue;
+            double& most = most_counts.try_emplace(c, kInf).first->second;
+            most = std::min(most, more_samples * sqr(x.sum) / x.squares);
+        }
+    }
+    for (const auto& [c, most] : most_counts) {
+        SideTallies& f = found[c];
+        f.method = f.method.with_count_of_at_most(most);
+        f.implied = f.implied.with_count_of_at_most(most);
     }
     std::set<PathClass> classes;
     SideTallies all;

@@ -30,6 +30,7 @@ void ContributionTally::observe(const Join& join, Rgb contribution, float share,
     const double alone = double(luminance(contribution)) * reach;
     sums.alone.add(alone);
     sums.weighted.add(alone * double(join.mis_weight));
+    sums.of_alone.add(alone, double(join.mis_weight));
 }
 
 std::vector<ContributionTally::Entry> ContributionTally::entries() const {
@@ -38,8 +39,11 @@ std::vector<ContributionTally::Entry> ContributionTally::entries() const {
         const PathClass c = PathClass::from_key(uint32_t(key));
         const Strategy strategy = Strategy(key >> 40);
         const int s = int(key >> 32 & 0xff);
-        out.push_back(
-            {c, {strategy, s, c.edges + 1 + is_pair(strategy) - s}, sums.weighted, sums.alone});
+        out.push_back({c,
+                       {strategy, s, c.edges + 1 + is_pair(strategy) - s},
+                       sums.weighted,
+                       sums.alone,
+                       sums.of_alone});
     }
     std::sort(out.begin(), out.end());
     return out;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
 #include <tuple>
 #include <unordered_map>
@@ -50,6 +51,30 @@ struct Tally {
     }
 };
 
+/// Estimates of ∫ f²/p_q, the second moment of the unweighted contributions of a technique q, from the contributions of
+/// several techniques, each with its power-heuristic weight. Rare ones are seen where another technique finds them.
+struct SecondMoments {
+    double own = 0;  ///< Part of the estimate for the technique itself.
+    /// Part of a lower bound of that for any other technique q: there f/p_q is at least √(w / (1 - w)) times as large as the
+    /// contribution, whose weight is w, because w_q ≤ 1 - w.
+    double others = 0;
+
+    void add(double contribution, double mis_weight) {
+        constexpr double kRounding = 0x1p-24;  // of weights
+        const double rest = std::max(1 - mis_weight, kRounding);
+        const double weighted = contribution * mis_weight;
+        own += weighted * contribution;
+        others += weighted * contribution * std::sqrt(mis_weight / rest);
+    }
+    SecondMoments& operator+=(const SecondMoments& o) {
+        own += o.own, others += o.others;
+        return *this;
+    }
+    SecondMoments scaled(double factor) const {
+        return {own * factor * factor, others * factor * factor};
+    }
+};
+
 /// Division of the crop into count × count tiles.
 struct TileGrid {
     FilmGeometry film;
@@ -71,7 +96,16 @@ public:
         PathClass path_class;
         Technique technique;
         Tally weighted, alone;
+        SecondMoments of_alone{};
 
+        Entry scaled(double factor) const {
+            return {path_class, technique, weighted.scaled(factor), alone.scaled(factor),
+                    of_alone.scaled(factor)};
+        }
+        Entry& operator+=(const Entry& o) {
+            weighted += o.weighted, alone += o.alone, of_alone += o.of_alone;
+            return *this;
+        }
         /// By class, then by technique.
         friend bool operator<(const Entry& a, const Entry& b) {
             return std::tie(a.path_class, a.technique.strategy, a.technique.s) <
@@ -103,6 +137,7 @@ private:
     std::vector<float> cut_offs_;
     struct Sums {
         Tally weighted, alone;
+        SecondMoments of_alone;
         std::vector<TileSum>* tiles = nullptr;  ///< Element of tiles_.
     };
     std::unordered_map<uint64_t, Sums> sums_;  ///< By class, strategy and s.

@@ -97,17 +97,13 @@ void IndependentRun::merge(const IndependentRun& other, uint64_t renderings) {
     stats += other.stats;
 
     // Entries are sorted, see ContributionTally::entries().
-    for (ContributionTally::Entry& e : entries)
-        e.weighted = e.weighted.scaled(own), e.alone = e.alone.scaled(own);
+    for (ContributionTally::Entry& e : entries) e = e.scaled(own);
     for (const ContributionTally::Entry& e : other.entries) {
         const auto at = std::lower_bound(entries.begin(), entries.end(), e);
-        if (at != entries.end() && !(e < *at)) {
-            at->weighted += e.weighted.scaled(its);
-            at->alone += e.alone.scaled(its);
-        } else {
-            entries.insert(
-                at, {e.path_class, e.technique, e.weighted.scaled(its), e.alone.scaled(its)});
-        }
+        if (at != entries.end() && !(e < *at))
+            *at += e.scaled(its);
+        else
+            entries.insert(at, e.scaled(its));
     }
     for (auto& [c, tally] : classes) tally = tally.scaled(own);
     for (const auto& [c, tally] : other.classes) classes[c] += tally.scaled(its);
@@ -195,7 +191,7 @@ IndependentRun SeriesRenderer::render(const IntegratorSpec& spec, uint64_t seed,
     const double scale = 1 / (double(spp) * double(scene_.film().pixel_count()));
     IndependentRun out{r.film().image(), tally.entries(), tally.tiles(), {}, r.stats()};
     for (ContributionTally::Entry& e : out.entries) {
-        e.weighted = e.weighted.scaled(scale), e.alone = e.alone.scaled(scale);
+        e = e.scaled(scale);
         out.classes[e.path_class.without_length_of_edges()] += e.weighted;
     }
     for (auto& [path_class, tiles] : out.tiles)

@@ -193,6 +193,28 @@ TEST(Verify, NamesWhatIsNotCompared) {
     EXPECT_GT(m.out_of_reach, 0.01);
 }
 
+/// A lamp so small that hits never find it, under a sky whose light they find often: they do not seem rare.
+TEST(Verify, KnowsWhatHitsAloneWouldHaveToFind) {
+    const Scene scene =
+        build(front_camera(8) + room() +
+              sphere("0,0.5,0", "0.002",
+                     "<emitter type=\"area\"><rgb name=\"radiance\" value=\"1e6\"/></emitter>") +
+              "<emitter type=\"constant\"/>");
+    VerifyOptions options = quick_options();
+    options.spp = 256;
+    const VerifyReport report = verify(scene, {IntegratorSpec::parse("path")}, options);
+    int hits = 0, tested = 0;
+    for (const TechniqueReport& t : report.methods[0].techniques) {
+        EXPECT_FALSE(report.deviates(t.comparison)) << t.technique.s << ',' << t.technique.t;
+        tested += t.comparison.is_tested();
+        if (t.technique != Technique{Strategy::Hit, 0, 3}) continue;
+        ++hits;
+        EXPECT_FALSE(t.comparison.is_tested());
+    }
+    EXPECT_EQ(hits, 1);
+    EXPECT_GT(tested, 0);
+}
+
 /// Correlated pixels increase the error of a reference's mean.
 TEST(Verify, AllowsForCorrelatedPixelsOfAReference) {
     const Scene scene = build(lit_room(8));
