@@ -1,6 +1,7 @@
 #include "render/cost_table.h"
 
 #include <array>
+#include <stdexcept>
 
 namespace etendue {
 namespace {
@@ -28,7 +29,7 @@ constexpr std::array<MethodCost, 7> kMethodCosts{{{"path", 1.00, 1.5e-6},
 const MethodCost& cost_of(const std::string& method) {
     for (const MethodCost& m : kMethodCosts)
         if (method == m.method) return m;
-    return kMethodCosts.front();
+    throw std::logic_error("there are no costs of " + method);
 }
 
 }  // namespace

@@ -71,7 +71,7 @@ Guiding train(const Scene& scene, IntegratorSpec& spec, uint64_t seed, int threa
                       depth, walks);
     });
     if (!guiding.guide() || guiding.guide()->surfaces.is_empty())
-        throw std::runtime_error(
+        throw NothingToLearn(
             fmt::format("{}: a guide has nothing to learn from: {}", scene.file(),
                         scene.has_emitters() ? "no walk met a surface" : "there are no emitters"));
     return guiding;

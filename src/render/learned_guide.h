@@ -2,6 +2,7 @@
 // What a method with a guide learns before its first pass, for users who want to see why it helps or does not.
 
 #include <array>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -41,10 +42,15 @@ struct GuidedPlace {
     Image directions(int width, int height) const;
 };
 
+/// Where no walk has met a surface.
+struct NothingToLearn : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
 class LearnedGuide {
 public:
     /// Trains as a rendering by `spec` with guide=on (or guide=hp02, if it has this) does before its first pass. Throws
-    /// std::runtime_error where the method has no guide, or the scene nothing to learn from.
+    /// std::runtime_error where the method has no guide, and NothingToLearn.
     LearnedGuide(const Scene& scene, IntegratorSpec spec, uint64_t seed, int threads);
 
     const Guide& guide() const { return *guiding_.guide(); }

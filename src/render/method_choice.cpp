@@ -35,8 +35,14 @@ constexpr double kHopeless = 3;
 constexpr double kLongChains = 1.5;
 /// Simulated seconds that a rendering without limits is taken to have.
 constexpr double kUnlimitedSeconds = 60;
-/// Walks of each kind that train the guide of a pilot, and that of the rendering.
-constexpr uint64_t kWalksOfPilot = 16384, kWalksOfTraining = 100000;
+/// Walks of each kind that train the guide of a pilot.
+constexpr uint64_t kWalksOfPilot = 16384;
+/// The same of the rendering, whose methods have their default parameters.
+uint64_t walks_of_training() {
+    for (const ParamInfo& p : Guiding::params())
+        if (std::string_view(p.name) == "guide_walks") return std::stoull(p.fallback);
+    throw std::logic_error("guides have no parameter guide_walks");
+}
 
 const char* const kWithoutPilots = "bdpt";
 const char* const kNoLimit = "-1";  // of max_depth
@@ -94,8 +100,9 @@ std::vector<Contender> contenders(const Scene& scene, const IntegratorParams& as
     std::vector<Contender> all;
     // What light of emitters without extent reaches by way of mirrors and glass, eye paths never find.
     if (!scene.has_delta_emitters()) all.push_back(Contender::of("path"));
-    for (const char* name : {"bdpt", "pcbpt", "upg+bdpt"}) all.push_back(Contender::of(name));
+    for (const char* name : {"bdpt", "pcbpt"}) all.push_back(Contender::of(name));
     if (asked.flag("consistent")) all.push_back(Contender::of("vcm"));
+    all.push_back(Contender::of("upg+bdpt"));
     if (asked.flag("chains") && ranks == 1 && (max_depth < 0 || max_depth >= kShortestOfChains))
         for (const char* name : {"mlt", "mmlt"}) all.push_back(Contender::of(name, kChains));
     return all;
@@ -165,9 +172,12 @@ public:
         }
         MethodChoice choice;
         choice.asked = with_all_params(settings_.integrator);
-        const bool has_pilots = contenders_.front().shown.images > 0;
         choice.candidates = candidates();
-        const std::string best = has_pilots ? contenders_.front().method() : kWithoutPilots;
+        // Where no pilot has met light with noise, all are equal.
+        const bool has_seen_noise =
+            std::any_of(choice.candidates.begin(), choice.candidates.end(),
+                        [](const auto& k) { return k.images > 0 && k.error() > 0; });
+        const std::string best = has_seen_noise ? contenders_.front().method() : kWithoutPilots;
         std::stable_partition(choice.candidates.begin(), choice.candidates.end(),
                               [&](const auto& k) { return k.method == best; });
         choice.chosen = spec_of(best).to_string();
@@ -263,16 +273,18 @@ private:
 
     /// Scores the pilots of the contenders, and puts the contenders in order.
     void judge(int width, int height) {
-        const double ratio = whole_pixels() / (double(width) * double(height));
+        const double pixels = double(width) * double(height), ratio = whole_pixels() / pixels;
         score(width, height, ratio);
-        const std::vector<double> factors = factors_of_noise(ratio);
+        const std::vector<double> factors =
+            factors_of_noise(pixels_before_ > 0 ? pixels / pixels_before_ : kGrowth, ratio);
+        pixels_before_ = pixels;
         apply(factors);
         if (budget_.error()) {
             const double before = budget_.seconds();
             double shortest = std::numeric_limits<double>::infinity();
             for (const Contender& c : contenders_) {
-                const double renderings = c.shown.error() / sqr(*budget_.error());
-                shortest = std::min(shortest, c.shown.start_seconds + renderings * before);
+                shortest = std::min(shortest, seconds_until(sqr(*budget_.error()), c.shown.error(),
+                                                            before, c.shown.start_seconds));
             }
             budget_.set_error_seconds(shortest);
             score(width, height, ratio);
@@ -310,8 +322,9 @@ private:
         }
     }
 
-    /// What the noise of the rendering has more or less than that of the pilots.
-    std::vector<double> factors_of_noise(double ratio) {
+    /// What the noise of the rendering has more or less than that of the pilots, whose film has `growth` times as many pixels as
+    /// the one before.
+    std::vector<double> factors_of_noise(double growth, double ratio) {
         using Kind = NoiseOfFilms::Kind;
         std::vector<NoiseOfFilms> noise;
         for (Contender& c : contenders_) {
@@ -324,7 +337,7 @@ private:
                              .like = c.history.image_noise > 0 ? -1 : index_of(c.unguided)});
             c.history.image_noise = now;
         }
-        std::vector<double> factors = reuse_factors(noise, kGrowth, ratio);
+        std::vector<double> factors = reuse_factors(noise, growth, ratio);
         for (size_t i = 0; i < factors.size(); ++i)
             if (noise[i].kind == Kind::Chains) factors[i] = kLongChains;
         return factors;
@@ -344,7 +357,7 @@ private:
         constexpr double kMostSamples = 1 << 17;
         const double chains =
             c.pilot.start_seconds * std::max(1.0, std::min(whole_pixels(), kMostSamples) / pixels);
-        return chains + (c.guide ? training_seconds(kWalksOfTraining) : 0);
+        return chains + (c.guide ? training_seconds(walks_of_training()) : 0);
     }
 
     void drop_hopeless() {
@@ -361,7 +374,7 @@ private:
     /// Whether guides may still help. Their training for the rendering itself must be a small part of it.
     bool may_add_guides() const {
         return !has_tried_guides_ &&
-               Budget::is_small(training_seconds(kWalksOfTraining), budget_.seconds()) &&
+               Budget::is_small(training_seconds(walks_of_training()), budget_.seconds()) &&
                std::any_of(contenders_.begin(), contenders_.end(),
                            [](const Contender& c) { return c.can_have_guide(); });
     }
@@ -399,8 +412,7 @@ private:
                                        settings_.threads);
             if (drop_.load()) throw PassDropped();
             if (learned.is_kept_by_auto()) return std::make_shared<const Guide>(learned.guide());
-        } catch (const std::runtime_error&) {
-            // There is nothing to learn.
+        } catch (const NothingToLearn&) {
         }
         return nullptr;
     }
@@ -414,7 +426,8 @@ private:
     std::vector<MethodChoice::Candidate> dropped_, untried_;
     double cheapest_ = 0;  ///< Simulated seconds of a sample of the first contender.
     std::string cheapest_method_;
-    uint64_t number_ = 0;  ///< Of the next pilot.
+    double pixels_before_ = 0;  ///< Of the film of the last pilots.
+    uint64_t number_ = 0;       ///< Of the next pilot.
     bool has_tried_guides_ = false;
 };
 

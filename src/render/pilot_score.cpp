@@ -199,7 +199,7 @@ std::vector<PilotScore> score_pilots(std::span<const PilotImages> methods, int w
 
 std::vector<double> reuse_factors(std::span<const NoiseOfFilms> methods, double growth,
                                   double ratio) {
-    constexpr double kMostGain = kMostGainOfReuse;
+    const double most_gain = std::pow(kMostGainOfReuse, std::log(growth) / std::log(4.0));
     std::vector<double> gains;
     double of_others = 0;
     for (const NoiseOfFilms& m : methods) {
@@ -211,7 +211,7 @@ std::vector<double> reuse_factors(std::span<const NoiseOfFilms> methods, double 
     for (size_t i = 0; i < gains.size(); ++i) {
         const bool gains_further = methods[i].kind == NoiseOfFilms::Kind::Reuse && of_others > 0;
         const double gain = gains_further ? gains[i] / of_others : 1.0;
-        gains[i] = std::pow(std::clamp(gain, 1.0, kMostGain), -std::log(ratio) / std::log(growth));
+        gains[i] = std::pow(std::clamp(gain, 1.0, most_gain), -std::log(ratio) / std::log(growth));
     }
     return gains;
 }

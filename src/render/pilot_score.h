@@ -21,6 +21,7 @@
 // times that, each division of a pixel's area by four is taken to divide the variance of chains by f, down to that of
 // independent states.
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -43,6 +44,12 @@ struct PilotScore {
     double noise = 0, missing = 0;
     double error() const { return noise + missing; }
 };
+
+/// The time after which the relMSE is `wanted`, where `error` is predicted for a rendering of `seconds`, of which the first
+/// `start` have no samples.
+inline double seconds_until(double wanted, double error, double seconds, double start) {
+    return start + error / wanted * std::max(0.0, seconds - start);
+}
 
 /// The scores of methods, each with two images or more, on a film of this size.
 std::vector<PilotScore> score_pilots(std::span<const PilotImages> methods, int width, int height);

@@ -210,6 +210,16 @@ TEST(ReuseFactors, GoOnToTheFilmOfTheRendering) {
     EXPECT_DOUBLE_EQ(f[3], 1);
     EXPECT_NEAR(f[4], 1 / sqr(kMostGainOfReuse), 1e-12);
     EXPECT_DOUBLE_EQ(f[5], 1);
+    // A narrow film grows less; the largest gain is that of four times as many pixels.
+    EXPECT_NEAR(reuse_factors(methods, 2, 16)[4], f[4], 1e-12);
+}
+
+// A chain whose first states take 4 s of 10 s has its error after 6 s of samples.
+TEST(PilotScore, TimeForAnErrorCountsTheStartOnce) {
+    EXPECT_DOUBLE_EQ(seconds_until(0.01, 0.01, 10, 4), 10);
+    EXPECT_DOUBLE_EQ(seconds_until(0.01, 0.02, 10, 4), 16);
+    EXPECT_DOUBLE_EQ(seconds_until(0.01, 0.02, 10, 0), 20);
+    EXPECT_DOUBLE_EQ(seconds_until(0.01, 0.02, 10, 12), 12);
 }
 
 }  // namespace
