@@ -12,9 +12,7 @@
 namespace etendue {
 namespace {
 
-/// Largest rr_depth of the pilot's walks. Without Russian roulette, walks would not end in a closed room.
-constexpr int kPilotRoulette = 10;
-/// The same of samples in which chains find their first states.
+/// Largest rr_depth of samples in which chains find their first states.
 constexpr int kFindingRoulette = 2;
 /// Longest time of the mutations of a pass, relative to that of its samples of direct light.
 constexpr double kLongest = 8;
@@ -45,7 +43,7 @@ MarkovIntegrator::MarkovIntegrator(const IntegratorParams& p, const DepthOptions
                .mutations = double(p.number("mutations", 0.0f, 1024.0f))},
       paths_(depth, kShortest), worth_(worth), guiding_(std::move(guiding)),
       direct_({std::min(depth.max_depth, kShortest - 1), depth.rr_depth}, 1),
-      pilot_paths_({depth.max_depth, std::min(depth.rr_depth, kPilotRoulette)}, kShortest),
+      pilot_paths_(pilot_depth(depth), kShortest),
       finding_paths_({depth.max_depth, std::min(depth.rr_depth, kFindingRoulette)}, kShortest) {
     if (options_.groups % 2 != 0)
         throw std::runtime_error(

@@ -18,6 +18,12 @@ void add_step_figures(const ChainStats& stats, std::span<const char* const> muta
 
 class MarkovIntegrator : public Integrator {
 public:
+    /// Of the walks of pilots and of those that train a guide, where chains have `depth`. Without Russian roulette, walks would
+    /// not end in a closed room.
+    static DepthOptions pilot_depth(const DepthOptions& depth) {
+        constexpr int kPilotRoulette = 10;
+        return {depth.max_depth, std::min(depth.rr_depth, kPilotRoulette)};
+    }
     /// Length in edges of the shortest paths that chains make. Shorter paths are made by one independent sample per pixel
     /// and pass.
     static constexpr int kShortest = 3;

@@ -7,6 +7,7 @@
 #include "integrator/mlt.h"
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "integrator/markov.h"
 #include "mcmc/path_space.h"
@@ -20,7 +21,12 @@ public:
         : MarkovIntegrator(p, DepthOptions::without_roulette(p), {.correlation = 10, .cost = 1.25},
                            Guiding(p)),
           user_paths_(p.string("user_paths")),
-          user_ratio_(double(p.number("user_ratio", 0.01f, 100.0f))) {}
+          user_ratio_(double(p.number("user_ratio", 0.01f, 100.0f))) {
+        if (!user_paths_.empty() && p.string("guide") != "off")
+            throw std::runtime_error(
+                "mlt: with user_paths no samples are made that a guide could lead; leave out "
+                "user_paths or guide");
+    }
 
 protected:
     Chains begin(const PassContext& pass, const Pilot& pilot) override {

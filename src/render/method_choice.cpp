@@ -60,7 +60,7 @@ struct Contender {
     std::string in_pilots;          ///< The method with parameters for short runs.
     std::shared_ptr<const Guide> guide = nullptr;
     std::string unguided = "";  ///< The method of which this is the one with a guide.
-    Pilot pilot;
+    MethodPilot pilot;
     /// Of the last pilot; 0: there was none.
     struct History {
         double image_noise = 0;
@@ -261,11 +261,11 @@ private:
         judge(width, height);
     }
 
-    Pilot pilot_of(const Scene& small, const Contender& c) {
+    MethodPilot pilot_of(const Scene& small, const Contender& c) {
         RenderSettings settings = settings_;
         settings.integrator = spec_of(c.in_pilots);
         settings.integrator.guide = c.guide;
-        const Pilot pilot = render_pilot(small, settings, number_, drop_);
+        const MethodPilot pilot = render_pilot(small, settings, number_, drop_);
         number_ += kPilotReplicates;
         budget_.spend(pilot.all_seconds);
         return pilot;
@@ -302,7 +302,7 @@ private:
         const double pixels = double(width) * double(height);
         std::vector<PilotImages> images;
         for (Contender& c : contenders_) {
-            Pilot& p = c.pilot;
+            MethodPilot& p = c.pilot;
             c.history.start_a_pixel = p.start_seconds / pixels;
             c.shown.pixels = width * height;
             c.shown.images = int(p.images.images.size());

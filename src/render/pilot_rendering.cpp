@@ -58,7 +58,7 @@ private:
 };
 
 void add_replicate(const Scene& small, RenderSettings settings, uint64_t number,
-                   const std::atomic<bool>& drop, Pilot& pilot) {
+                   const std::atomic<bool>& drop, MethodPilot& pilot) {
     settings.seed = pilot_seed(settings.seed, PilotUse::Choice, number);
     static_cast<RenderLimits&>(settings) = {.spp = kPilotPasses, .seconds = {}, .error = {}};
     Renderer renderer(small, settings);
@@ -104,9 +104,9 @@ std::pair<int, int> size_of_pilot(const FilmGeometry& film, double pixels) {
     return {side(film.crop_width), side(film.crop_height)};
 }
 
-Pilot render_pilot(const Scene& small, const RenderSettings& settings, uint64_t first,
-                   const std::atomic<bool>& drop) {
-    Pilot pilot;
+MethodPilot render_pilot(const Scene& small, const RenderSettings& settings, uint64_t first,
+                         const std::atomic<bool>& drop) {
+    MethodPilot pilot;
     for (uint64_t r = 0; r < kPilotReplicates; ++r)
         add_replicate(small, settings, first + r, drop, pilot);
     return pilot;

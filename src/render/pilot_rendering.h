@@ -13,7 +13,7 @@ namespace etendue {
 constexpr int kPilotReplicates = 3, kPilotPasses = 4;
 
 /// What pilots of one candidate on one film have shown.
-struct Pilot {
+struct MethodPilot {
     PilotImages images;
     bool has_chains = false;
     int passes_per_image = 1;
@@ -31,7 +31,7 @@ std::pair<int, int> size_of_pilot(const FilmGeometry& film, double pixels);
 /// Renders a small film kPilotReplicates times by a method and with options of `settings`, whose limits do not count. `first`:
 /// number of the first of these renderings among those of a choice. Their random numbers are not those of a rendering with
 /// the same seed, nor of each other. Throws PassDropped if `drop` is set.
-Pilot render_pilot(const Scene& small, const RenderSettings& settings, uint64_t first,
-                   const std::atomic<bool>& drop);
+MethodPilot render_pilot(const Scene& small, const RenderSettings& settings, uint64_t first,
+                         const std::atomic<bool>& drop);
 
 }  // namespace etendue

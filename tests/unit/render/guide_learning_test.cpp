@@ -165,7 +165,9 @@ TEST(LearnedGuides, AreThoseOfARendering) {
     for (const auto& [method, mode] :
          {std::pair("bdpt:guide=on,guide_walks=20000", FilterMode::Spread),
           {"bdpt:guide=on,guide_walks=20000", FilterMode::Sample},
-          {"path:guide=on,guide_walks=20000", FilterMode::Spread}}) {
+          {"path:guide=on,guide_walks=20000", FilterMode::Spread},
+          {"pssmlt:guide=on,guide_walks=20000", FilterMode::Spread},
+          {"mlt:guide=on,guide_walks=20000", FilterMode::Spread}}) {
         RenderSettings settings;
         settings.filter_mode = mode;
         settings.integrator = IntegratorSpec::parse(method);
@@ -185,6 +187,22 @@ TEST(LearnedGuides, AreThoseOfARendering) {
             << method;
         EXPECT_EQ(figures["guide_gain_emission"], double(learned.guide().emission_gain)) << method;
     }
+}
+
+/// All methods that have the parameter, chains among them.
+TEST(LearnedGuides, ExistForEachMethodThatHasOne) {
+    const Scene scene = test::build(test::front_camera(8) + test::room() + test::area_lamp());
+    int methods = 0;
+    for (const IntegratorEntry& entry : integrator_registry()) {
+        const std::vector<ParamInfo>& params = entry.info.params;
+        if (std::none_of(params.begin(), params.end(),
+                         [](const ParamInfo& p) { return std::string(p.name) == "guide"; }))
+            continue;
+        ++methods;
+        EXPECT_NO_THROW(learn(scene, std::string(entry.info.name) + ":guide_walks=1000"))
+            << entry.info.name;
+    }
+    EXPECT_GE(methods, 10);
 }
 
 std::vector<float> numbers_of(const GuideCell& cell) {

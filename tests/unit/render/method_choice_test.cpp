@@ -291,7 +291,7 @@ TEST(Pilots, HaveNoPassOfTheRendering) {
             settings.sampler = sampler;
             settings.seed = 7;
             const auto own = passes_of(scene, settings);
-            const Pilot pilot = render_pilot(scene, settings, 0, never);
+            const MethodPilot pilot = render_pilot(scene, settings, 0, never);
             std::vector<std::vector<float>> all = pilot.images.images;
             ASSERT_GE(all.size(), size_t(2 * kPilotReplicates));
             // The comparison can find equal ones.

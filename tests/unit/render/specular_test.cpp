@@ -11,7 +11,7 @@
 namespace etendue::test {
 namespace {
 
-struct Rendering {
+struct SpecularRendering {
     std::vector<Rgb> image;
     RenderStats stats;
     std::vector<std::pair<std::string, double>> figures;
@@ -25,7 +25,7 @@ struct Rendering {
     }
 };
 
-Rendering render(const Scene& scene, const std::string& method, int threads = 2) {
+SpecularRendering render(const Scene& scene, const std::string& method, int threads = 2) {
     RenderSettings settings;
     settings.integrator = IntegratorSpec::parse(method);
     settings.threads = threads;
@@ -53,8 +53,8 @@ TEST(SpecularOption, SearchesNothingWhereNoChainCanBe) {
     const Scene scene = build(front_camera(kSize) + room() + area_lamp() +
                               sphere("0,-0.4,0", "0.4", "<bsdf type=\"roughdielectric\"/>"));
     for (const std::string method : kMethods) {
-        const Rendering off = render(scene, method),
-                        on = render(scene, method + ":specular_connections=on");
+        const SpecularRendering off = render(scene, method),
+                                on = render(scene, method + ":specular_connections=on");
         EXPECT_EQ(on.stats.chain_seeds, 0u) << method;
         EXPECT_EQ(on.stats.rays(), off.stats.rays()) << method;
         EXPECT_TRUE(same_bits(on.image, off.image)) << method;
@@ -65,8 +65,8 @@ TEST(SpecularOption, AutoFindsLightThatNothingElseMakes) {
     const Scene scene = build(front_camera(kSize) + room() + sphere("0,0.3,0", "0.3", kGlass) +
                               point_light("0,0.3,0"));
     for (const std::string method : kMethods) {
-        const Rendering on = render(scene, method + ":specular_connections=on"),
-                        automatic = render(scene, method + ":specular_connections=auto");
+        const SpecularRendering on = render(scene, method + ":specular_connections=on"),
+                                automatic = render(scene, method + ":specular_connections=auto");
         // Where splats make the caustic, this is the one that is seen through the ball.
         EXPECT_TRUE(automatic.uses_them()) << method;
         EXPECT_TRUE(same_bits(automatic.image, on.image)) << "the decision has no other effect";
@@ -77,8 +77,8 @@ TEST(SpecularOption, AutoLeavesLargeLampsToHits) {
     const Scene scene = build(front_camera(kSize) + room() + sphere("0,-0.4,0", "0.4", kGlass) +
                               "<emitter type=\"constant\"/>");
     for (const std::string method : kMethods) {
-        const Rendering off = render(scene, method),
-                        automatic = render(scene, method + ":specular_connections=auto");
+        const SpecularRendering off = render(scene, method),
+                                automatic = render(scene, method + ":specular_connections=auto");
         EXPECT_FALSE(automatic.uses_them()) << method;
         EXPECT_TRUE(same_bits(automatic.image, off.image)) << method;
         EXPECT_EQ(automatic.stats.chain_seeds, 0u) << "the pilot is not a part of the rendering";
@@ -87,8 +87,8 @@ TEST(SpecularOption, AutoLeavesLargeLampsToHits) {
 
 TEST(SpecularOption, AutoDoesNotDependOnThreads) {
     const Scene scene = build(lantern_room(front_camera(kSize)));
-    const Rendering one = render(scene, "path:specular_connections=auto", 1),
-                    more = render(scene, "path:specular_connections=auto", 3);
+    const SpecularRendering one = render(scene, "path:specular_connections=auto", 1),
+                            more = render(scene, "path:specular_connections=auto", 3);
     EXPECT_EQ(one.uses_them(), more.uses_them());
     EXPECT_TRUE(same_bits(one.image, more.image));
 }
