@@ -263,7 +263,7 @@ TEST_P(SpecularAgreement, WithPathTracing) {
     for (const std::string method : {"path", "bdpt", "pcbpt", "upg+bdpt"})
         expect_same_image(render_tiles(scene,
                                        method + ":rr_depth=20,max_depth=8,specular_connections=on",
-                                       {2 * c.passes, 4, 2}),
+                                       {3 * c.passes, 4, 2}),
                           path, c.resolution, method);
 }
 
