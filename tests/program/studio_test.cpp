@@ -648,8 +648,13 @@ TEST_F(StudioTest, CtrlCKeepsRuns) {
     post("/v1/run", {{"action", "open"}, {"file", kept[0]["file"]}});
     post("/v1/run", {{"action", "continue"}, {"run", 1}, {"spp", passes + 2}});
     EXPECT_EQ(wait_for_run(1, "finished")["passes"], passes + 2);
-    fs::remove_all(runs);
-    std::ofstream(runs) << "no folder";
+    // The run may still be written there.
+    ASSERT_TRUE(wait_for([&] {
+        std::error_code ignored;
+        fs::remove_all(runs, ignored);
+        std::ofstream(runs) << "no folder";
+        return fs::is_regular_file(runs);
+    }));
     post("/v1/run", {{"action", "continue"}, {"run", 1}, {"spp", passes + 3}});
     EXPECT_TRUE(wait_for(
         [&] { return get("/v1/state").parsed()["runs"][0]["passes"] == json(passes + 3); }));
