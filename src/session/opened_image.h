@@ -11,8 +11,7 @@ namespace etendue {
 
 struct OpenedImage {
     std::string file;  ///< Its name.
-    std::string
-        note;  ///< What the file says of the image, such as method and passes; may be empty.
+    std::string note;  ///< Method and passes, where the file tells them.
     /// Those of an image file are one pass without a variance.
     std::shared_ptr<const Snapshot> pixels;
     IntervalKind interval = IntervalKind::None;
