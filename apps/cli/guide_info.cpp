@@ -35,6 +35,13 @@ json to_json(const GuidedPlace::Field& field) {
     return {{"share", field.share}, {"lobes", lobes}};
 }
 
+json to_json(const std::vector<EmitterChoice>& choices) {
+    json j = json::array();
+    for (const EmitterChoice& c : choices)
+        j.push_back({{"emitter", c.name}, {"learned", c.learned}, {"by_power", c.by_power}});
+    return j;
+}
+
 json to_json(const GuidedPlace& place, const std::vector<int>& pixel) {
     json j{{"pixel", pixel},
            {"delta_events", place.delta_events},
@@ -47,6 +54,7 @@ json to_json(const GuidedPlace& place, const std::vector<int>& pixel) {
     j["gloss"] = kGloss[size_t(place.gloss_class)];
     j["eye_walks"] = to_json(place.eye);
     j["light_walks"] = to_json(place.light);
+    j["next_events"] = to_json(place.lights);
     return j;
 }
 
@@ -75,6 +83,15 @@ std::string field_text(const char* title, const json& field) {
     return text;
 }
 
+std::string choices_text(const json& choices, const char* of) {
+    std::string text;
+    for (const json& c : choices)
+        text += fmt::format("    \"{}\" has a share of {:.3f} {}, by power {:.3f}\n",
+                            c["emitter"].get<std::string>(), c["learned"].get<double>(), of,
+                            c["by_power"].get<double>());
+    return text;
+}
+
 std::string place_text(const json& place) {
     std::string text = fmt::format("  pixel       {},{}", place["pixel"][0].get<int>(),
                                    place["pixel"][1].get<int>());
@@ -93,6 +110,7 @@ std::string place_text(const json& place) {
     text += field_text("light walks, toward importance", place["light_walks"]);
     if (!place["emission"]["lobes"].empty())
         text += field_text("emission, toward importance", place["emission"]);
+    text += choices_text(place["next_events"], "of the next events there");
     return text;
 }
 
@@ -149,19 +167,17 @@ json GuideInfo::run(const Scene& scene) const {
     const Image image = learned.shares();
     if (!shares.empty()) write_image(shares, image);
     const auto mean = LearnedGuide::mean_shares(image);
-    json choices = json::array();
-    for (const auto& c : learned.emitter_choices(5))
-        choices.push_back({{"emitter", c.name}, {"guided", c.guided}, {"by_power", c.by_power}});
     json j{{"method", learned.method()},
            {"cells", guide.surfaces.cells().size()},
            {"bytes", guide.memory_bytes()},
            {"gain_eye", guide.surfaces.gain(TransportMode::Radiance)},
            {"gain_light", guide.surfaces.gain(TransportMode::Importance)},
            {"gain_emission", guide.emission_gain},
+           {"gain_lights", guide.lights.gain()},
            {"share_eye", mean[0]},
            {"share_light", mean[1]},
            {"kept_by_auto", learned.is_kept_by_auto()},
-           {"emitter_choices", choices}};
+           {"emitter_choices", to_json(learned.emitter_choices(5))}};
     if (!place.is_null()) j["place"] = place;
     return j;
 }
@@ -176,11 +192,9 @@ std::string guide_text(const json& j) {
     text += fmt::format("    light walks gain {:.2f} nats, share {:.3f} at the first surfaces\n",
                         number("gain_light"), number("share_light"));
     text += fmt::format("    emission    gain {:.2f} nats\n", number("gain_emission"));
-    for (const json& c : j["emitter_choices"])
-        text +=
-            fmt::format("    \"{}\" emits a share of {:.3f} of the light paths, by power {:.3f}\n",
-                        c["emitter"].get<std::string>(), c["guided"].get<double>(),
-                        c["by_power"].get<double>());
+    text += fmt::format("    next events gain {:.2f} nats by the selection of emitters\n",
+                        number("gain_lights"));
+    text += choices_text(j["emitter_choices"], "of the light paths");
     text += fmt::format("    guide=auto  {} it\n",
                         j["kept_by_auto"].get<bool>() ? "keeps" : "does without");
     return j.contains("place") ? text + place_text(j["place"]) : text;

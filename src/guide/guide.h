@@ -1,7 +1,8 @@
 #pragma once
 // What guides the walks of a pass: learned directions at surfaces and at the start of light paths, and the choice of
-// emitters. Frozen in a pass, and a function of earlier random numbers only, so that every pass is unbiased.
+// emitters by light paths and by next events. Frozen in a pass, and a function of earlier random numbers only, so that every pass is unbiased.
 
+#include "guide/light_selection.h"
 #include "guide/tree.h"
 #include "math/distribution.h"
 
@@ -25,10 +26,16 @@ public:
     float emission_gain =
         0;  ///< Mean gain of all light paths by the directions from y_0, or of y_0 at infinity.
 
+    LightSelections lights;  ///< Of next events.
+
     /// Whether walks have directions and densities of a cell at each surface.
     bool guides_surfaces() const { return uses_surfaces && !surfaces.is_empty(); }
     /// Whether walks look up a cell at each surface, for its directions or for its roulette.
     bool has_cells() const { return (uses_surfaces || has_roulette) && !surfaces.is_empty(); }
+    /// The learned selection of emitters at `p`, on the side `n` (see PlacedWeight); nullptr where there is none.
+    const LightSelection* lights_at(Vec3 p, Vec3 n) const {
+        return lights.is_empty() ? nullptr : lights.find(p, n);
+    }
 
     void add_at_infinity(const AtInfinity& learned) { at_infinity_.push_back(learned); }
     /// The learned directions of an emitter at infinity; nullptr where their share is 0.
@@ -52,14 +59,14 @@ public:
         emission_weights_ = std::move(weights);
         emission_choice_ = AliasTable(emission_weights_);
     }
-    /// Whether this choice differs from that of next events.
+    /// Whether this choice differs from Emitter::selection_pmf.
     bool chooses_emitters() const { return !emission_choice_.empty(); }
     /// Where chooses_emitters(): the index of an emitter, and the probability of one.
     uint32_t sample_emitter(double u) const { return emission_choice_.sample(u).index; }
     float emission_pmf(uint32_t index) const { return emission_choice_.pmf(index); }
 
     size_t memory_bytes() const {
-        return surfaces.memory_bytes() + emission.memory_bytes() +
+        return surfaces.memory_bytes() + emission.memory_bytes() + lights.memory_bytes() +
                at_infinity_.capacity() * sizeof(AtInfinity);
     }
 
@@ -73,6 +80,7 @@ public:
         to.put(emission_gain);
         to.put(at_infinity_);
         to.put(emission_weights_);
+        lights.save(to);
     }
     template <class State>
     void load(State& from) {
@@ -86,6 +94,7 @@ public:
         std::vector<double> weights;
         from.get(weights);
         set_emission(std::move(weights));
+        lights.load(from);
     }
 
 private:

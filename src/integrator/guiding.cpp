@@ -22,6 +22,7 @@ struct EmissionRecord {
     GuideSample sample;  ///< Of y_0, without weight; at infinity, of the direction to y_0.
     const Emitter* emitter;
     std::vector<PlacedWeight> reached;  ///< With the power that arrives there.
+    PlacedWeight arrival;  ///< At y_1, with the part of the power that next events bring there.
 };
 
 struct Block {
@@ -85,19 +86,20 @@ void record(const GuideSample& s, Block& block) {
 }
 
 void record_light_walk(const SubPath& y, Block& block) {
+    PlacedWeight arrival;
     for (int i = 1; i < y.size(); ++i) {
         if (!y[i].is_connectible) continue;
         GuideSample s = sample_at(y, i, TransportMode::Importance);
         if (i == 1) {
             const float hits = share_of_hits(y);
             s.weight *= hits;
-            block.left_out[s.mode].push_back(
-                {y[1].p, side_normal(y[1]), luminance(y[1].beta) * (1 - hits)});
+            arrival = {y[1].p, side_normal(y[1]), luminance(y[1].beta) * (1 - hits)};
+            block.left_out[s.mode].push_back(arrival);
         }
         record(s, block);
     }
     if (y.size() < 2) return;
-    EmissionRecord r{{}, y[0].emitter, {}};
+    EmissionRecord r{{}, y[0].emitter, {}, arrival};
     for (int i = 1; i < y.size(); ++i)
         if (y[i].is_connectible)
             r.reached.push_back({y[i].p, side_normal(y[i]), luminance(y[i].beta)});
@@ -230,6 +232,9 @@ GuideLearning learning_of_emission(GuidedWalks walks) {
     return learning;
 }
 
+/// Least gain of eye walks alone, in nats, from which on `auto` guides them at surfaces.
+constexpr float kLeastGainAlone = 0.57f;
+
 template <class T>
 void move_to_end(std::vector<T>& to, std::vector<T>& from) {
     to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
@@ -290,6 +295,19 @@ void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& recor
     guide.set_emission(std::move(by_emitter));
 }
 
+/// The selection of emitters by next events is learned from the light that they bring. Where it gains little, that of everywhere
+/// stays, which takes less time.
+void learn_lights(const Scene& scene, const std::vector<EmissionRecord>& records, Guide& guide) {
+    constexpr float kLeastGain = 0.1f;  // in nats
+    if (!scene.has_emitter_choice()) return;
+    std::vector<float> pmf;
+    for (const auto& e : scene.emitters()) pmf.push_back(e->selection_pmf);
+    std::vector<Arrival> arrivals;
+    for (const EmissionRecord& r : records) arrivals.push_back({r.arrival, r.emitter->index});
+    LightSelections lights(std::move(arrivals), pmf);
+    if (lights.gain() >= kLeastGain) guide.lights = std::move(lights);
+}
+
 }  // namespace
 
 std::vector<ParamInfo> Guiding::params(GuideRefits refits) {
@@ -324,16 +342,17 @@ bool Guiding::gains_little(const Guide& guide, GuidedWalks walks) {
     // says little about methods that have both walks. Alone, eye walks gain 0.59 to 0.64 on veach-bidir, where the guide of
     // `path` pays, and 0.51 to 0.56 on many-lights, where it does not. With both walks they gain 2.9 on lantern and at most
     // 0.3 elsewhere; emission gains 1.3 and more, or less than 0.1.
-    constexpr float kLeastEyeGain = 1.0f, kLeastGainAlone = 0.57f, kLeastLightGain = 0.4f;
+    constexpr float kLeastEyeGain = 1.0f, kLeastLightGain = 0.4f, kLeastGainOfLights = 0.5f;
     const bool eye = guide.surfaces.gain(TransportMode::Radiance) >=
                      (walks == GuidedWalks::Eye ? kLeastGainAlone : kLeastEyeGain),
                light = guide.surfaces.gain(TransportMode::Importance) >= kLeastLightGain,
-               emission = guide.emission_gain >= kLeastLightGain;
+               emission = guide.emission_gain >= kLeastLightGain,
+               lights = guide.lights.gain() >= kLeastGainOfLights;
     switch (walks) {
-    case GuidedWalks::Eye: return !eye;
+    case GuidedWalks::Eye: return !eye && !lights;
     case GuidedWalks::Light: return !light && !emission;
     case GuidedWalks::Both:
-    case GuidedWalks::BothWithPairs: return !eye && !emission;
+    case GuidedWalks::BothWithPairs: return !eye && !emission && !lights;
     }
     return true;
 }
@@ -343,6 +362,8 @@ bool Guiding::gains_nothing(const Guide& guide, GuidedWalks walks) const {
     // two gains 2.9 nats, or both at most 0.3: on veach-bidir, where guided directions make a sample worse.
     constexpr float kLeastGain = 0.5f;
     const bool has_gains = mode_ != Mode::Footprints && !given_;
+    if (mode_ == Mode::Auto && walks == GuidedWalks::Eye)
+        return guide.surfaces.gain(TransportMode::Radiance) < kLeastGainAlone;
     return joins_both(walks) && has_gains &&
            std::max(guide.surfaces.gain(TransportMode::Radiance),
                     guide.surfaces.gain(TransportMode::Importance)) < kLeastGain;
@@ -433,6 +454,7 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
     guide->surfaces.set_contributions(all.contributions);
     guide->light_contribution = float(all.light_contribution / double(walks));
     if (mode_ != Mode::Footprints) {
+        if (joins_of(guided, 1).next_event > 0) learn_lights(pass.scene, all.emission, *guide);
         auto& seen = all.left_out[size_t(TransportMode::Importance)];
         learn_emission(pass.scene, all.emission, PlacedDensity(std::move(seen)),
                        learning_of_emission(guided), hash_combine(seed, 1), *guide);
@@ -475,6 +497,7 @@ void Guiding::add_figures(std::vector<std::pair<std::string, double>>& figures) 
     figures.push_back(
         {"guide_gain_light", double(guide_->surfaces.gain(TransportMode::Importance))});
     figures.push_back({"guide_gain_emission", double(guide_->emission_gain)});
+    figures.push_back({"guide_gain_lights", double(guide_->lights.gain())});
     figures.push_back({"guide_bytes", double(guide_->memory_bytes())});
 }
 

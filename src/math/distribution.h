@@ -35,6 +35,7 @@ public:
     double total() const { return total_; }
     size_t size() const { return cells_.size(); }
     bool empty() const { return cells_.empty(); }
+    size_t memory_bytes() const { return cells_.capacity() * sizeof(Cell); }
 
 private:
     struct Cell {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "guide/light_selection.h"
 #include "math/rotated.h"
 
 namespace etendue {
@@ -34,7 +35,7 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
     if (e.Le.is_zero()) return {};
 
     // From the split before x_0 outward: next event has its own density of x_0, all others have the emission's.
-    const double p_NE = double(emitter.selection_pmf) * e.pdf / v.pdf_fwd;
+    const double p_NE = double(next_event_pmf(z[last - 1], emitter)) * e.pdf / v.pdf_fwd;
     const double p_L = counts.uses_light_paths()
                            ? double(emission_pmf(counts.guide, emitter)) *
                                  origin_pdf(counts.guide, emitter, v.p, e.pdf_y0) / v.pdf_fwd
@@ -70,11 +71,17 @@ struct EmitterChoice {
     const Emitter* emitter;
     FinePoint u;
 };
-EmitterChoice choose_emitter(const Scene& scene, int last, Sampler& sampler, uint32_t draw) {
+EmitterChoice choose_emitter(const Scene& scene, const SubPath& z, int last, Sampler& sampler,
+                             uint32_t draw) {
     sampler.seek(Stream::Connection, uint32_t(last));
-    const Emitter& emitter =
-        scene.sample_emitter(rotated(sampler.next_1d_fine_if(scene.has_emitter_choice()), draw));
-    return {&emitter, rotated(sampler.next_2d_fine(), draw)};
+    const double u = rotated(sampler.next_1d_fine_if(scene.has_emitter_choice()), draw);
+    const FinePoint of_point = rotated(sampler.next_2d_fine(), draw);
+    const LightSelection* learned = z[last].lights;
+    if (!learned) return {&scene.sample_emitter(u), of_point};
+    const LightSelection::Draw selected = learned->sample(u);
+    return {selected.emitter ? &scene.emitter(*selected.emitter)
+                             : &scene.sample_emitter(selected.u),
+            of_point};
 }
 
 }  // namespace
@@ -92,7 +99,7 @@ void prefetch_next_events(const Scene& scene, std::span<const WalkInTurn> walks)
     for (const WalkInTurn& w : walks)
         for (int i = 1; i < std::min(w.path->size(), int(kMostVertices)); ++i) {
             if (!(*w.path)[i].is_connectible) continue;
-            const EmitterChoice chosen = choose_emitter(scene, i, *w.sampler, 0);
+            const EmitterChoice chosen = choose_emitter(scene, *w.path, i, *w.sampler, 0);
             searches[count++] = {chosen, chosen.emitter->prefetch_search(chosen.u)};
         }
     for (const Search& s : std::span(searches.data(), count))
@@ -104,7 +111,7 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
     const int last = t - 1;
     const Vertex& v = z[last];
     if (!v.is_connectible || !scene.has_emitters()) return {};
-    const auto [chosen, u] = choose_emitter(scene, last, sampler, draw);
+    const auto [chosen, u] = choose_emitter(scene, z, last, sampler, draw);
     const Emitter& emitter = *chosen;
     DirectSample d;
     if (!emitter.sample_direct(v.p, u, d)) return {};
@@ -115,7 +122,7 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
     const bool infinite = emitter.is_infinite();
     const float inv_dist2 = infinite ? 1.0f : 1 / sqr(d.dist);
     const float to_x0 = emitter.is_area() ? abs_dot(d.ng, d.wi) * inv_dist2 : inv_dist2;
-    const float p_NE = emitter.selection_pmf * d.pdf;
+    const float p_NE = next_event_pmf(v, emitter) * d.pdf;
     Rgb C = v.beta * f.f * d.Le * (to_x0 / p_NE);
     const RayEnd x0 = emitter.is_area() ? RayEnd{d.p, d.ng, d.slack} : RayEnd{d.p};
     if (scene.has_media()) {
@@ -176,10 +183,10 @@ std::optional<Edge> connect(const Scene& scene, const SubPath& y, int s, const S
     if (fb.f.is_zero()) return {};
     const BsdfEval fa = a.eval(edge.w, TransportMode::Importance);
     if (fa.f.is_zero()) return {};
-    const double squares = s == 1
-                               ? emission_squares(double(next_event_ratio(a, edge.w, counts.guide)),
-                                                  b.is_fixed_by_film, counts)
-                               : sqr(double(counts.connect * counts.reaching(b.is_fixed_by_film)));
+    const double squares =
+        s == 1 ? emission_squares(double(next_event_ratio(a, b, edge.w, counts.guide)),
+                                  b.is_fixed_by_film, counts)
+               : sqr(double(counts.connect * counts.reaching(b.is_fixed_by_film)));
     edge.contribution = a.beta * fa.f * fb.f * b.beta * inv_dist2;
     if (scene.has_media()) edge.contribution *= edge_attenuation(scene, a, b, edge.w);
 

@@ -127,6 +127,9 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
     p.can_connect_ends = p.can_hit_emitter && !(x[0]->is_infinite && x[k]->is_infinite);
     p.light[0] = emission_pmf(guide, emitter);
     p.next_event = emitter.selection_pmf;
+    if (guide && x[1]->kind == Vertex::Kind::Surface)
+        if (const LightSelection* lights = guide->lights_at(x[1]->p, side_normal(*x[1])))
+            p.next_event = lights->pmf(emitter.index, emitter.selection_pmf);
     if (p.can_hit_emitter) {
         p.light[0] *= origin_pdf(guide, emitter, x[0]->p, hit.pdf_y0);
         p.next_event *= hit.pdf;

@@ -104,6 +104,10 @@ float Vertex::max_guided_pdf(float unguided, const DirectionCone& cone, Transpor
     return (1 - a) * unguided + a * (1 - delta_probability(*this, wo, mode)) * guided;
 }
 
+float learned_selection_pmf(const LightSelection& lights, const Emitter& emitter) {
+    return lights.pmf(emitter.index, emitter.selection_pmf);
+}
+
 float guided_emission_pmf(const Guide& guide, const Emitter& emitter) {
     return guide.chooses_emitters() ? guide.emission_pmf(emitter.index) : emitter.selection_pmf;
 }

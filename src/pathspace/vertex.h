@@ -16,6 +16,7 @@ namespace etendue {
 class Guide;
 struct GuideCell;
 struct GuideView;
+class LightSelection;
 struct WalkContribution;
 
 /// A probability in steps of 2^-10, so that the compactly stored value is exactly the one used in the decision.
@@ -78,6 +79,8 @@ struct Vertex {
     float slack = 0;                   ///< Of a surface vertex, see SurfaceGeometry.
     const GuideCell* guide =
         nullptr;  ///< Learned directions here; nullptr if the walk is not guided.
+    /// Learned selection of the emitter of next events here; nullptr if it is that of Emitter::selection_pmf.
+    const LightSelection* lights = nullptr;
     float guide_rev =
         0;  ///< Learned density of `wo` for walks in the other mode, which arrive from the successor.
     Bsdf bsdf;
@@ -198,8 +201,13 @@ float emission_pdf(const Guide* guide, const Emitter& emitter, Vec3 p, Vec3 ng, 
                    float unguided);
 /// How light that starts at `p` with the normal `ng` sees the lobes of the cell.
 GuideView emission_view(const Emitter& emitter, const GuideCell& cell, Vec3 p, Vec3 ng);
+float learned_selection_pmf(const LightSelection& lights, const Emitter& emitter);
+/// Probability that next events at `v` select the emitter.
+inline float next_event_pmf(const Vertex& v, const Emitter& emitter) {
+    return v.lights ? learned_selection_pmf(*v.lights, emitter) : emitter.selection_pmf;
+}
 float guided_emission_pmf(const Guide& guide, const Emitter& emitter);
-/// Probability that light paths choose the emitter; next events choose it with Emitter::selection_pmf.
+/// Probability that light paths choose the emitter.
 inline float emission_pmf(const Guide* guide, const Emitter& emitter) {
     return guide ? guided_emission_pmf(*guide, emitter) : emitter.selection_pmf;
 }
@@ -254,6 +262,7 @@ struct SubPath {
         v.shape = nullptr;
         v.emitter = nullptr;
         v.guide = nullptr;
+        v.lights = nullptr;
         return v;
     }
     /// Allocates memory for `size` vertices, and no more where they are all.

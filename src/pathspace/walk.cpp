@@ -93,9 +93,13 @@ bool append_surface(const WalkContext& walk, SubPath& path, TransportMode mode, 
     Vertex& v = path.append();
     v.set_surface(*hit.shape, hit.location, hit.geometry, -ray.d, path.arena);
     v.medium = step.medium;
-    if (const Guide* guide = walk.counts.guide; guide && guide->has_cells()) {
-        path.cell = &guide->surfaces.cell(v.p);
-        if (guide->guides_surfaces()) v.set_guide(*path.cell, mode, walk.counts.uses_light_paths());
+    if (const Guide* guide = walk.counts.guide) {
+        if (guide->has_cells()) {
+            path.cell = &guide->surfaces.cell(v.p);
+            if (guide->guides_surfaces())
+                v.set_guide(*path.cell, mode, walk.counts.uses_light_paths());
+        }
+        v.lights = guide->lights_at(v.p, side_normal(v));
     }
     v.pair_level = walk.learned ? walk.learned->pair_level(v.p) : uint8_t(0);
     v.beta = step.beta;
@@ -139,11 +143,11 @@ bool append_end(const WalkContext& walk, SubPath& path, TransportMode mode, Step
 
 }  // namespace
 
-float next_event_ratio(const Vertex& y0, Vec3 w, const Guide* guide) {
+float next_event_ratio(const Vertex& y0, const Vertex& next, Vec3 w, const Guide* guide) {
     const EmitterHit e = y0.is_infinite
                              ? y0.emitter->eval_infinite(y0.p)
                              : y0.emitter->eval_surface(y0.ng, y0.uv, y0.location.prim, w);
-    const float choices = y0.emitter->selection_pmf / emission_pmf(guide, *y0.emitter);
+    const float choices = next_event_pmf(next, *y0.emitter) / emission_pmf(guide, *y0.emitter);
     const float pdf_y0 = origin_pdf(guide, *y0.emitter, y0.p, e.pdf_y0);
     return pdf_y0 > 0 ? choices * e.pdf / pdf_y0 : choices;
 }
@@ -258,7 +262,7 @@ void leave_emitter(const WalkContext& walk, const EmissionSample& e, Sampler& sa
     step.medium = y0.medium_toward(e.d);
     trace(walk, sampler, y, step);
     if (append_end(walk, y, TransportMode::Importance, step))
-        y[1].next_event_ratio = next_event_ratio(y[0], e.d, walk.counts.guide);
+        y[1].next_event_ratio = next_event_ratio(y[0], y[1], e.d, walk.counts.guide);
 }
 
 }  // namespace

@@ -65,8 +65,8 @@ bool start_light_path(const WalkContext& walk, Sampler& sampler, SubPath& y);
 void start_light_path(const WalkContext& walk, const Emitter& emitter, const EmissionSample& e,
                       Sampler& sampler, SubPath& y);
 
-/// p_NE / p_L of y_0 for a next vertex along `w`, where `guide` guides light paths.
-float next_event_ratio(const Vertex& y0, Vec3 w, const Guide* guide);
+/// p_NE / p_L of y_0 for a next vertex `next` along `w`, where `guide` guides light paths.
+float next_event_ratio(const Vertex& y0, const Vertex& next, Vec3 w, const Guide* guide);
 
 /// Russian roulette at the last vertex, and a sampled direction; empty where the walk ends. Every decision at a vertex
 /// has its own slot of random numbers (lobe, direction, roulette, masks), used or not, so that a Markov chain finds its

@@ -163,16 +163,21 @@ bool LearnedGuide::is_kept_by_auto() const {
     return !Guiding::gains_little(guide(), guided_walks(method_));
 }
 
-std::vector<LearnedGuide::EmitterChoice> LearnedGuide::emitter_choices(size_t most) const {
+template <class Pmf>
+std::vector<EmitterChoice> LearnedGuide::most_probable(size_t most, const Pmf& pmf) const {
     std::vector<EmitterChoice> choices;
-    if (!guide().chooses_emitters()) return choices;
     for (const auto& e : scene_.emitters())
-        choices.push_back({name_of(scene_, *e), emission_pmf(&guide(), *e), e->selection_pmf});
+        choices.push_back({name_of(scene_, *e), pmf(*e), e->selection_pmf});
     std::stable_sort(
         choices.begin(), choices.end(),
-        [](const EmitterChoice& a, const EmitterChoice& b) { return a.guided > b.guided; });
+        [](const EmitterChoice& a, const EmitterChoice& b) { return a.learned > b.learned; });
     choices.resize(std::min(choices.size(), most));
     return choices;
+}
+
+std::vector<EmitterChoice> LearnedGuide::emitter_choices(size_t most) const {
+    if (!guide().chooses_emitters()) return {};
+    return most_probable(most, [&](const Emitter& e) { return emission_pmf(&guide(), e); });
 }
 
 Image LearnedGuide::shares() const {
@@ -242,6 +247,10 @@ GuidedPlace LearnedGuide::at_pixel(int x, int y) const {
     };
     place.eye = field(TransportMode::Radiance);
     place.light = field(TransportMode::Importance);
+    constexpr size_t kMostLights = 5;
+    if (const LightSelection* lights = guide().lights_at(v.p, side_normal(v)))
+        place.lights = most_probable(
+            kMostLights, [&](const Emitter& e) { return learned_selection_pmf(*lights, e); });
     if (v.emitter && !guide().emission.is_empty()) {
         const GuideCell& at = guide().emission.cell(v.p);
         const GuideCell::Field& f = at.field(TransportMode::Importance);

@@ -11,7 +11,13 @@
 
 namespace etendue {
 
-/// The learned directions at one place.
+/// Learned probability of an emitter.
+struct EmitterChoice {
+    std::string name;
+    float learned, by_power;
+};
+
+/// The learned directions and lights at one place.
 struct GuidedPlace {
     struct Lobe {
         Vec3 direction;  ///< Mean, as seen from the place.
@@ -35,6 +41,8 @@ struct GuidedPlace {
     int delta_events = 0;  ///< Mirrors and smooth glass on the way.
     int gloss_class = 0;   ///< See guide_class().
     Field eye, light, emission;
+    /// The emitters that next events select there most often; empty where they select by power.
+    std::vector<EmitterChoice> lights;
 
     /// The densities of directions, seen from the place like an environment of Mitsuba: rows from +y to -y, columns by
     /// azimuth from -z over +x. The colours are red for eye walks, green for light walks and blue for emission, each
@@ -58,12 +66,8 @@ public:
     /// Whether guide=auto would keep the guide of the method.
     bool is_kept_by_auto() const;
 
-    /// An emitter that light paths choose with another probability than next events do.
-    struct EmitterChoice {
-        std::string name;
-        float guided, by_power;
-    };
-    /// At most so many, by the largest guided probability.
+    /// The emitters that light paths choose most often: at most so many, the most frequent one first; empty where light paths
+    /// choose by power.
     std::vector<EmitterChoice> emitter_choices(size_t most) const;
 
     /// Shares of guided directions at the first surfaces: red for eye walks, green for light walks; the layer `cells` has a
@@ -77,6 +81,10 @@ public:
     GuidedPlace at_pixel(int x, int y) const;
 
 private:
+    /// The most probable emitters, where `pmf(emitter)` is the learned probability.
+    template <class Pmf>
+    std::vector<EmitterChoice> most_probable(size_t most, const Pmf& pmf) const;
+
     const Scene& scene_;
     std::string method_;
     uint64_t seed_;

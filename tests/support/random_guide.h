@@ -38,7 +38,20 @@ inline Guide random_guide(Vec3 center, float radius, std::vector<double> emissio
     guide.light_contribution = 1;
     guide.surfaces = guide.emission = GuideTree(cell);
     for (double& weight : emission) weight *= 0.1 + double(u());
-    if (emission.size() > 1) guide.set_emission(std::move(emission));
+    if (emission.size() > 1) {
+        // On each side of surfaces, some emitters are unknown.
+        constexpr float kKnown = 0.7f;
+        const std::array<Vec3, kSurfaceSides> sides{
+            {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}, {}}};
+        std::vector<Arrival> arrivals;
+        for (const Vec3 n : sides)
+            for (uint32_t e = 0; e < emission.size(); ++e)
+                if (const float weight = u(); weight < kKnown)
+                    arrivals.push_back({{{}, n, weight}, e});
+        guide.lights = LightSelections(
+            std::move(arrivals), std::vector<float>(emission.size(), 1 / float(emission.size())));
+        guide.set_emission(std::move(emission));
+    }
     for (const uint32_t emitter : at_infinity) {
         Guide::AtInfinity learned{emitter, {}};
         learned.fit.share.fill(kShare), learned.fit.training_share.fill(kShare);

@@ -237,7 +237,7 @@ protected:
             if (e.f.is_zero()) return;
             a.beta = from.beta * e.f / e.pdf;
             a.pdf_fwd = to_area(e.pdf, from, b);
-            a.next_event_ratio = next_event_ratio(from, -a.wo, counts.guide);
+            a.next_event_ratio = next_event_ratio(from, a, -a.wo, counts.guide);
             a.weight_sum = 0;
         } else {
             const BsdfEval f = from.eval(-a.wo, TransportMode::Importance);

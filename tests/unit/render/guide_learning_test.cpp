@@ -50,7 +50,7 @@ TEST(LearnedEmission, IsThatOfWhatIsSeenInMirrorsAndPanes) {
         const LearnedGuide guide = learn(scene, "light");
         EXPECT_TRUE(guide.guide().chooses_emitters());
         const auto choices = guide.emitter_choices(1);
-        return std::pair(choices.empty() ? 0.0f : choices[0].guided, guide.guide().emission_gain);
+        return std::pair(choices.empty() ? 0.0f : choices[0].learned, guide.guide().emission_gain);
     };
     const auto [direct, direct_gain] = learned(test::front_camera(kSize));
     EXPECT_GT(direct, 0.8f);
@@ -60,6 +60,21 @@ TEST(LearnedEmission, IsThatOfWhatIsSeenInMirrorsAndPanes) {
         EXPECT_NEAR(choice, direct, 0.05f);
         EXPECT_NEAR(gain, direct_gain, 0.15f);
     }
+}
+
+/// Next events select the lamp that shines on the place, not one as strong behind a wall.
+TEST(LearnedLights, AreThoseThatShineOnThePlace) {
+    const Scene scene =
+        test::build(test::front_camera(kSize) + test::room() + test::area_lamp() + useless_lamp());
+    for (const char* method : {"path", "bdpt"}) {
+        const LearnedGuide learned = learn(scene, method);
+        EXPECT_GT(learned.guide().lights.gain(), 0.3f) << method;
+        const GuidedPlace back = learned.at_pixel(kSize / 2, kSize / 2);
+        ASSERT_FALSE(back.lights.empty()) << method;
+        EXPECT_GT(back.lights[0].learned, 0.8f) << method;
+        EXPECT_LT(back.lights[0].by_power, 0.6f) << method;
+    }
+    EXPECT_TRUE(learn(scene, "light").guide().lights.is_empty());
 }
 
 /// Light walks learn the way to what the lens sees, not to the pane before it.
@@ -107,7 +122,7 @@ TEST(LearnedEmission, KnowsThatLightPassesThroughSheets) {
         useless_lamp());
     const LearnedGuide learned = learn(scene, "light");
     ASSERT_TRUE(learned.guide().chooses_emitters());
-    EXPECT_GT(learned.emitter_choices(1)[0].guided, 0.8f);
+    EXPECT_GT(learned.emitter_choices(1)[0].learned, 0.8f);
 }
 
 /// Where the walks of a training end at their first vertex, as most do outdoors, direct light is still learned.
