@@ -319,7 +319,7 @@ void add_studio_command(CLI::App& app) {
         "studio", "Show a progressive rendering in a browser, compare methods, edit light paths");
     command->scene.add_to(c);
     c.add_option("-i,--integrator", command->first_run.integrator,
-                 "Integrator of the first run, with parameters (default: the scene's)");
+                 "Integrator of the first run, with parameters (default: the scene's, or auto)");
     add_sampler_option(c, command->first_run.sampler);
     c.add_flag("--idle", command->idle, "Render nothing until the page asks for it");
     c.add_option("-o,--output", command->output,
