@@ -624,8 +624,7 @@ void add_render_command(CLI::App& app) {
         ->capture_default_str();
     c.add_option("-i,--integrator", command->request.integrator,
                  "Integrator with parameters: bdpt or bdpt:max_depth=12,rr_depth=5 (default: the "
-                 "scene's, or "
-                 "auto)");
+                 "scene's, or auto)");
     c.add_option("--spp", command->request.spp, "Samples per pixel")->check(must_be_above_0);
     c.add_option("--time", command->request.seconds,
                  "Seconds to render; may be exceeded by half a pass")
