@@ -1,11 +1,10 @@
 // Rays by the array: their first hits, and whether they hit anything.
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
+#include <algorithm>
 
 #include "bindings.h"
-#include "system/threads.h"
+#include "film/parallel_for.h"
+#include "film/thread_arena.h"
 
 namespace etendue::python {
 namespace {
@@ -32,10 +31,11 @@ void for_each_ray(size_t n, const Body& body) {
     use_threads();
     const nb::gil_scoped_release no_gil;
     constexpr size_t kGrain = 1024;
-    tbb::task_arena arena(thread_count(0));
+    ThreadArena arena(0);
     arena.execute([&] {
-        tbb::parallel_for(tbb::blocked_range<size_t>(0, n, kGrain), [&](const auto& range) {
-            for (size_t i = range.begin(); i < range.end(); ++i) body(i);
+        parallel_for((n + kGrain - 1) / kGrain, [&](size_t grain) {
+            const size_t end = std::min(n, (grain + 1) * kGrain);
+            for (size_t i = grain * kGrain; i < end; ++i) body(i);
         });
     });
 }

@@ -53,7 +53,7 @@ void ExpectedLuminance::average_blocks() {
     const int width = geometry_.crop_width, height = geometry_.crop_height;
     const int rows = (height + kBlock - 1) / kBlock;
     blocks_.assign(blocks_across() * uint64_t(rows), 0);
-    tbb::parallel_for(0, rows, [&](int row) {
+    parallel_for(rows, [&](int row) {
         float* const blocks = blocks_.data() + uint64_t(row) * blocks_across();
         const int begin = row * kBlock, end = std::min(begin + kBlock, height);
         for (int y = begin; y < end; ++y)

@@ -6,8 +6,7 @@
 #include <new>
 #include <type_traits>
 
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
+#include "film/parallel_for.h"
 
 namespace etendue {
 
@@ -30,9 +29,9 @@ void for_film_chunks(uint64_t count, uint64_t first, uint64_t last, const Body& 
         for (uint64_t chunk; (chunk = next.fetch_add(1, std::memory_order_relaxed)) < last;)
             body(chunk, chunk * kFilmChunk, std::min(count, (chunk + 1) * kFilmChunk));
     };
-    const uint64_t threads = uint64_t(tbb::this_task_arena::max_concurrency());
+    const uint64_t threads = uint64_t(ThreadArena::threads_here());
     try {
-        tbb::parallel_for(uint64_t(0), std::min(threads, last - first), [&](uint64_t) { work(); });
+        parallel_for(std::min(threads, last - first), [&](uint64_t) { work(); });
     } catch (const std::bad_alloc&) {
     }
     work();

@@ -6,6 +6,9 @@
 namespace etendue {
 namespace {
 
+/// How many calls of execute() this thread is in. Where it is in none, TBB has an arena for it that nobody asked for.
+thread_local int entries = 0;
+
 /// The number of threads, for whose stacks there is room then.
 int threads_with_room(int wanted) {
     const int threads = thread_count(wanted);
@@ -16,6 +19,18 @@ int threads_with_room(int wanted) {
 }  // namespace
 
 ThreadArena::ThreadArena(int wanted) : arena_(threads_with_room(wanted)), observer_(arena_) {}
+
+int ThreadArena::threads_here() {
+    return entries > 0 ? tbb::this_task_arena::max_concurrency() : 1;
+}
+
+ThreadArena::Entry::Entry() {
+    ++entries;
+}
+
+ThreadArena::Entry::~Entry() {
+    --entries;
+}
 
 ThreadArena::Observer::Observer(tbb::task_arena& arena) : task_scheduler_observer(arena) {
     observe(true);

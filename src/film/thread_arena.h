@@ -5,7 +5,8 @@
 
 namespace etendue {
 
-/// Threads of parallel loops: the caller of execute(), and workers of TBB, for whose stacks there is memory.
+/// Threads of parallel loops: the caller of execute(), and workers of TBB, for whose stacks there is memory. Loops outside of
+/// any arena have the calling thread alone; see parallel_for.h.
 class ThreadArena {
 public:
     /// Has thread_count(wanted) threads. Throws std::runtime_error where their stacks do not fit into the memory.
@@ -14,10 +15,23 @@ public:
     /// Returns task(), whose parallel loops have these threads.
     template <class Task>
     decltype(auto) execute(const Task& task) {
-        return arena_.execute(task);
+        return arena_.execute([&]() -> decltype(auto) {
+            const Entry entry;
+            return task();
+        });
     }
+    /// The number of threads that a parallel loop of this thread has.
+    static int threads_here();
 
 private:
+    /// While it exists, its thread is in an arena.
+    class Entry {
+    public:
+        Entry();
+        ~Entry();
+        Entry(const Entry&) = delete;
+        Entry& operator=(const Entry&) = delete;
+    };
     /// Counts the workers that have begun.
     class Observer final : public tbb::task_scheduler_observer {
     public:

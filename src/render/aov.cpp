@@ -4,8 +4,8 @@
 #include <stdexcept>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
+#include "film/parallel_for.h"
 #include "film/thread_arena.h"
 #include "pathspace/walk.h"
 
@@ -62,7 +62,7 @@ std::vector<std::vector<Rgb>> average_eye_paths(const Scene& scene, size_t layer
     const Film film(scene.film(), scene.filter());
     ThreadArena arena(threads);
     arena.execute([&] {
-        tbb::parallel_for(0, scene.film().crop_height, [&](int row) {
+        parallel_for(scene.film().crop_height, [&](int row) {
             SubPath z;
             RenderStats stats;
             const TechniqueCounts counts;

@@ -5,8 +5,8 @@
 #include <stdexcept>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
+#include "film/parallel_for.h"
 #include "film/thread_arena.h"
 #include "integrator/markov.h"
 #include "math/hash.h"
@@ -65,7 +65,7 @@ Guiding train(const Scene& scene, IntegratorSpec& spec, uint64_t seed, int threa
     const Film film(scene.film(), scene.filter());
     ThreadArena arena(threads);
     const auto for_each = [&](uint64_t count, const PassContext::Task& task) {
-        tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
+        parallel_for(count, [&](uint64_t i) {
             Sampler sampler(SamplerKind::Independent, seed);
             Workspace work;
             task(i, sampler, work);

@@ -12,8 +12,8 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/global_control.h>
 #include <tbb/info.h>
-#include <tbb/parallel_for.h>
 
+#include "film/parallel_for.h"
 #include "film/thread_arena.h"
 #include "render/method_choice.h"
 #include "render/statistics_section.h"
@@ -368,7 +368,7 @@ public:
         r_.kept_pass_ = passes_;
         const std::function<void()>& meanwhile = r_.settings_.meanwhile;
         const uint64_t count = r_.film_.sample_count(), in_turn = walks_in_turn(r_.scene_);
-        tbb::parallel_for(uint64_t(0), chunks(count), [&](uint64_t chunk) {
+        parallel_for(chunks(count), [&](uint64_t chunk) {
             if (meanwhile) meanwhile();
             SamplesInTurn samples(*this, chunk);
             const uint64_t end = std::min(count, (chunk + 1) * kChunk);
@@ -449,7 +449,7 @@ private:
     /// Calls use(context, work) for the samples 0 … count-1 of the pass, which have no eye paths.
     template <class Use>
     void for_each_sample(uint64_t count, const Use& use) const {
-        tbb::parallel_for(uint64_t(0), chunks(count), [&](uint64_t chunk) {
+        parallel_for(chunks(count), [&](uint64_t chunk) {
             Workspace& work = workspace();
             Sampler sampler(r_.settings_.sampler, numbers_.seed);
             FilmSink sink(receivers(work));
@@ -476,7 +476,7 @@ private:
             .chunks = chunks,
             .for_each_other_path =
                 [this](uint64_t count, const PassContext::Task& task) {
-                    tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
+                    parallel_for(count, [&](uint64_t i) {
                         go_on();
                         Sampler sampler(r_.settings_.sampler,
                                         pilot_seed(numbers_.seed, PilotUse::OtherPaths));
@@ -487,7 +487,7 @@ private:
                 },
             .for_each_chain =
                 [this](uint64_t count, const PassContext::ChainTask& task) {
-                    tbb::parallel_for(uint64_t(0), count, [&](uint64_t i) {
+                    parallel_for(count, [&](uint64_t i) {
                         go_on();
                         Workspace& work = workspace();
                         FilmSplats splats(receivers(work));

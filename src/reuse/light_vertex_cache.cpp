@@ -5,8 +5,8 @@
 #include <stdexcept>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
+#include "film/parallel_for.h"
 #include "guide/guide.h"
 
 namespace etendue {
@@ -86,7 +86,7 @@ void LightVertexCache::assemble() {
     vertices_.resize(total);
     places_.resize(total);
     guides_.resize(is_guided_ ? total : 0);
-    tbb::parallel_for(size_t(0), chunks_.size(), [&](size_t chunk) {
+    parallel_for(chunks_.size(), [&](size_t chunk) {
         const Chunk& c = chunks_[chunk];
         auto [path, first] = begins[chunk];
         std::copy(c.vertices.begin(), c.vertices.end(), vertices_.begin() + ptrdiff_t(first));

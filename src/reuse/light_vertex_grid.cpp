@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include <tbb/parallel_for.h>
+#include "film/parallel_for.h"
 
 namespace etendue {
 
@@ -18,7 +18,7 @@ void LightVertexGrid::build(const LightVertexCache& cache, float radius, int fir
     };
     std::vector<Block> blocks((vertices.size() + kBlock - 1) / kBlock + 1);
     const auto for_each_connectible = [&](const auto& use) {
-        tbb::parallel_for(size_t(0), blocks.size() - 1, [&](size_t block) {
+        parallel_for(blocks.size() - 1, [&](size_t block) {
             const size_t end = std::min(vertices.size(), (block + 1) * kBlock);
             size_t rank = 0;
             for (size_t i = block * kBlock; i < end; ++i)

@@ -2,7 +2,7 @@
 
 #include <numbers>
 
-#include <tbb/parallel_for.h>
+#include "film/parallel_for.h"
 
 namespace etendue {
 
@@ -12,7 +12,7 @@ PairDensity::PairDensity(const CellCounts& vertices, float radius, double correl
     // Ratio of the area of a disc to that of a cell's face: a plane through the cell has about that area in it.
     const double scale =
         correlation * multiple * std::numbers::pi * sqr(double(radius / cells_.width()));
-    tbb::parallel_for(size_t(0), levels_.size(), [&](size_t bucket) {
+    parallel_for(levels_.size(), [&](size_t bucket) {
         if (const uint32_t n = vertices.counts[bucket])
             levels_[bucket] = pair_level_of_share(1 / (1 + scale * double(n)));
     });

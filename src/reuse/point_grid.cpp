@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
+#include "film/parallel_for.h"
+#include "film/thread_arena.h"
 
 namespace etendue {
 
@@ -11,14 +11,13 @@ void PointGrid::build(std::span<const Entry> entries, float radius) {
     cells_ = CellHash(entries.size(), radius);
     const uint32_t buckets = cells_.buckets();
     std::vector<uint32_t> bucket(entries.size());
-    tbb::parallel_for(size_t(0), entries.size(), [&](size_t i) {
-        bucket[i] = cells_.bucket_of(cells_.cell_of(entries[i].p));
-    });
+    parallel_for(entries.size(),
+                 [&](size_t i) { bucket[i] = cells_.bucket_of(cells_.cell_of(entries[i].p)); });
     // Each part fills some of the buckets and reads all entries in order, so that the result does not depend on the
     // number of parts.
-    const uint32_t parts = uint32_t(std::clamp(tbb::this_task_arena::max_concurrency(), 1, 8));
+    const uint32_t parts = uint32_t(std::clamp(ThreadArena::threads_here(), 1, 8));
     const auto for_each_part = [&](const auto& use) {
-        tbb::parallel_for(uint32_t(0), parts, [&](uint32_t part) {
+        parallel_for(parts, [&](uint32_t part) {
             const auto bound = [&](uint32_t i) { return uint32_t(uint64_t(buckets) * i / parts); };
             const uint32_t begin = bound(part), end = bound(part + 1);
             for (size_t i = 0; i < bucket.size(); ++i)
@@ -33,7 +32,7 @@ void PointGrid::build(std::span<const Entry> entries, float radius) {
     for_each_part([&](size_t i) { entries_[next[bucket[i]]++] = entries[i]; });
     blocks_.resize((entries_.size() + kBlock - 1) / kBlock);
     // By block, since the lanes of a vector are one object, which only one thread may write.
-    tbb::parallel_for(size_t(0), blocks_.size(), [&](size_t block) {
+    parallel_for(blocks_.size(), [&](size_t block) {
         Block b{};
         const size_t first = block * kBlock, end = std::min(first + kBlock, entries_.size());
         for (size_t i = first; i < end; ++i) {

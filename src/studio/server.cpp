@@ -50,7 +50,7 @@ std::string text(beast::string_view s) {
 /// For the header; it decides how long the body may be, see limit_body().
 void set_limits(Parser& parser) {
     parser.header_limit(kMostHeaderBytes);
-    parser.body_limit(kMostFileBytes);
+    parser.body_limit(boost::none);
 }
 
 /// Whether the body of the request, whose header is read, may be as long as the header says.

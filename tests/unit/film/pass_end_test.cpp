@@ -6,8 +6,10 @@
 #include <string>
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include "film/film.h"
+#include "film/thread_arena.h"
 #include "no_memory_for_tasks.h"
 #include "system/section_file.h"
 
@@ -43,7 +45,8 @@ std::string state_of(const Film& film) {
     return to.take();
 }
 
-TEST(PassEnd, WithoutMemoryForTasksLeavesAllOfThePassOrNothing) {
+/// In an arena of several threads, where there are tasks.
+void end_passes_without_memory_for_tasks() {
     for (const int groups : {0, 2})
         for (const unsigned passes : {1u, 2u}) {
             const std::string before = state_of(*film_of(passes, groups)),
@@ -77,6 +80,11 @@ TEST(PassEnd, WithoutMemoryForTasksLeavesAllOfThePassOrNothing) {
             }
             EXPECT_GT(whole, 2);
         }
+}
+
+TEST(PassEnd, WithoutMemoryForTasksLeavesAllOfThePassOrNothing) {
+    const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, 8);
+    ThreadArena(4).execute(end_passes_without_memory_for_tasks);
 }
 
 }  // namespace
