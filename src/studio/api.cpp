@@ -178,6 +178,7 @@ Reply Api::state() {
            {"scene_version", session_.scene_version()},
            {"load_error", session_.load_error()},
            {"scene_changed", is_scene_changed_},
+           {"most_file_bytes", kMostFileBytes},
            {"has_reference", options_.reference.has_value()},
            {"reference_problem", ""},
            {"scene", nullptr}};

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <chrono>
 #include <deque>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <thread>
@@ -50,7 +51,7 @@ std::string text(beast::string_view s) {
 /// For the header; it decides how long the body may be, see limit_body().
 void set_limits(Parser& parser) {
     parser.header_limit(kMostHeaderBytes);
-    parser.body_limit(boost::none);
+    parser.body_limit(std::numeric_limits<uint64_t>::max());  // boost::none refuses all bodies
 }
 
 /// Whether the body of the request, whose header is read, may be as long as the header says.

@@ -4,7 +4,7 @@
 //     node check_images.mjs etendue scene.xml [folder for screenshots]
 
 import {spawnSync} from 'node:child_process';
-import {mkdirSync, writeFileSync} from 'node:fs';
+import {mkdirSync, truncateSync, writeFileSync} from 'node:fs';
 import {join} from 'node:path';
 
 import {Studio, check, checkNames, differs, folder, openBrowser, pixels, program, runParts, sceneFile} from './page.mjs';
@@ -22,6 +22,8 @@ render(...size, '-o', file('image.hdr'));
 run('tonemap', file('image.exr'), file('picture.png'), '--operator', 'srgb');
 render('--resolution', '32x24', '-o', file('small.exr'));
 writeFileSync(file('text.exr'), 'no image');
+writeFileSync(file('long.exr'), '');
+truncateSync(file('long.exr'), 2 ** 29 + 1);
 
 const choose = (id, value) => `(() => { const s = document.getElementById('${id}'); s.value = '${value}'; s.dispatchEvent(new Event('change')); })()`;
 const banner = "document.getElementById('banner-text').textContent";
@@ -89,6 +91,8 @@ async function imagesPart(browser) {
     // What cannot be shown.
     await open(browser, 'text.exr');
     await browser.until(`${banner}.includes('text.exr')`, 'a file that is no image is named');
+    await open(browser, 'long.exr');
+    await browser.until(`${banner} === 'long.exr is larger than 512 MiB'`, 'a file that is too long is named');
     await open(browser, 'small.exr');
     await browser.until(`${banner}.includes('small.exr has 32 × 24 pixels')`, 'a file of another size is named');
 

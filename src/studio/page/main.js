@@ -439,7 +439,7 @@ function showOpened(id) {
  */
 async function openImages(files) {
     let last = 0;
-    for (const file of files) last = await server.openImage(file);
+    for (const file of files) last = await server.openImage(file, state.most_file_bytes);
     await update();
     if (last > 0) showOpened(last);
 }

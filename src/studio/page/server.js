@@ -48,8 +48,12 @@ export class Server {
     /** @param {string} path @param {object} body */
     async post(path, body) { return (await this.fetch(path, {method: 'POST', body: JSON.stringify(body)})).json(); }
 
-    /** @param {File} file @returns {Promise<number>} The id of the image that is opened. */
-    async openImage(file) {
+    /**
+     * @param {File} file @param {number} mostBytes The server would end the connection of a longer one before it is read.
+     * @returns {Promise<number>} The id of the image that is opened.
+     */
+    async openImage(file, mostBytes) {
+        if (file.size > mostBytes) throw new Error(`${file.name} is larger than ${mostBytes / 2 ** 20} MiB`);
         const response = await this.fetch(`/v1/images?file=${encodeURIComponent(file.name)}`, {method: 'POST', body: file});
         return (await response.json()).image;
     }

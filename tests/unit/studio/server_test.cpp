@@ -272,7 +272,6 @@ TEST(Server, OutlivesExceptions) {
     EXPECT_EQ(ask(server.port(), "GET", "/v1/state", ""), 200);
 }
 
-/// The page can be opened at each address that is printed.
 TEST(Server, OnlyRequestsThatBringFilesAreLong) {
     StubHandler handler;
     Server server("127.0.0.1", 0);
@@ -298,6 +297,35 @@ TEST(Server, OnlyRequestsThatBringFilesAreLong) {
     EXPECT_EQ(in_chunks("/v1/images?file=a.exr", "guess"), 413);
 }
 
+/// The header of a request with so many bytes, which do not follow.
+std::string header_text(const std::string& target, uint64_t bytes,
+                        const std::string& token = "secret") {
+    return "POST " + target + " HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer " + token +
+           "\r\nContent-Length: " + std::to_string(bytes) + "\r\n\r\n";
+}
+
+TEST(Server, StatesTheLimitThatABodyExceeds) {
+    StubHandler handler;
+    Server server("127.0.0.1", 0);
+    const Server::Serving serving = server.start(handler);
+    const auto refusal = [&](const std::string& target, uint64_t bytes, const std::string& token) {
+        const Client client(server.port());
+        client.send(header_text(target, bytes, token));
+        return client.receive();
+    };
+    for (const uint64_t bytes : {uint64_t(kMostFileBytes) + 1, uint64_t(-1)}) {
+        const std::string of_file = refusal("/v1/images?file=a.exr", bytes, "secret");
+        EXPECT_EQ(status_of(of_file), 413);
+        EXPECT_NE(of_file.find("larger than 512 MiB"), std::string::npos) << of_file;
+        for (const std::string& other :
+             {refusal("/v1/run", bytes, "secret"), refusal("/v1/images?file=a.exr", bytes, "no")}) {
+            EXPECT_EQ(status_of(other), 413);
+            EXPECT_NE(other.find("larger than 1 MiB"), std::string::npos) << other;
+        }
+    }
+}
+
+/// The page can be opened at each address that is printed.
 TEST(Server, AnswersAtTheAddressesThatItStates) {
     for (const char* address : {"127.0.0.1", "0.0.0.0", "localhost", "::1", "::"}) {
         std::optional<Server> server;
