@@ -69,7 +69,7 @@ Admission Api::admit(const Request& request) {
     return a;
 }
 
-void Api::handle(const Request& request, std::function<void(Reply)> done) try {
+void Api::handle(Request request, std::function<void(Reply)> done) try {
     if (auto refusal = admit(request).refusal) return done(std::move(*refusal));
     const std::string_view path = request.path();
     const bool is_get = request.method == "GET" || request.method == "HEAD";
@@ -105,7 +105,7 @@ void Api::handle(const Request& request, std::function<void(Reply)> done) try {
             return reply;
         });
     }
-    if (path == "/v1/images") return images(request, done);
+    if (path == "/v1/images") return images(std::move(request), done);
     if (path == "/v1/run")
         return needs(request.method == "POST"), run(parse_object(request.body), done);
     if (path == "/v1/save")

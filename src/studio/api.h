@@ -49,7 +49,7 @@ public:
     Api(Session& session, ApiOptions options);
 
     Admission admit(const Request& request) override;
-    void handle(const Request& request, std::function<void(Reply)> done) override;
+    void handle(Request request, std::function<void(Reply)> done) override;
     uint64_t revision() override;
     std::string event() override;
     /// Why the reference cannot be shown; empty if it can, and without one.
@@ -71,7 +71,7 @@ private:
     void run(const nlohmann::json& body, const Done& done);
     void open(const nlohmann::json& body, const Done& done);
     /// Opens an image whose file is the body, or removes one.
-    void images(const Request& request, const Done& done);
+    void images(Request request, const Done& done);
     /// The image of a run, or of a view of an opened image; nullptr where the run has none yet.
     std::shared_ptr<const Snapshot> shown(const std::string& run_or_view);
     void save(const nlohmann::json& body, const Done& done);

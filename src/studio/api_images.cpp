@@ -161,7 +161,7 @@ std::shared_ptr<const Snapshot> Api::shown(const std::string& run_or_view) {
     return session_.snapshot(integer_of(run_or_view, "run"));
 }
 
-void Api::images(const Request& request, const Done& done) {
+void Api::images(Request request, const Done& done) {
     if (request.method == "DELETE") {
         opened_.remove(query_integer(request, "image", 0));
         return done(Reply::json("{}"));
@@ -169,9 +169,8 @@ void Api::images(const Request& request, const Done& done) {
     if (request.method != "POST") throw ApiError(405, "this method is not possible here");
     const std::string file = request.query("file").value_or("");
     if (file.empty()) throw ApiError(422, "\"file\", the name of the file, is missing");
-    // The bytes are copied: a request is over when the reply is made.
-    later(workers_, done, [this, file, bytes = request.body] {
-        return Reply::json(dump({{"image", opened_.add(opened_image(bytes, file))}}));
+    later(workers_, done, [this, file, bytes = std::move(request.body)]() mutable {
+        return Reply::json(dump({{"image", opened_.add(opened_image(std::move(bytes), file))}}));
     });
 }
 

@@ -12,8 +12,8 @@ namespace etendue {
 
 /// The largest header and body of a request that are read.
 inline constexpr size_t kMostHeaderBytes = 8 << 10, kMostBodyBytes = 1 << 20;
-/// The largest body of a request that brings a file.
-inline constexpr size_t kMostFileBytes = 512 << 20;
+/// The largest body of a request that brings a file, and the bodies of all such requests at a time.
+inline constexpr size_t kMostFileBytes = 512 << 20, kMostFileBytesAtATime = 2 * kMostFileBytes;
 
 struct Request {
     std::string method, target;
@@ -78,7 +78,7 @@ public:
     virtual Admission admit(const Request& request) = 0;
     /// Calls `done` once, from any thread. If `done` is never called, for which memory may be missing, the connection is
     /// closed with its last copy.
-    virtual void handle(const Request& request, std::function<void(Reply)> done) = 0;
+    virtual void handle(Request request, std::function<void(Reply)> done) = 0;
     /// Changes with the next event.
     virtual uint64_t revision() = 0;
     /// One line of JSON, without its end.

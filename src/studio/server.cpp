@@ -30,6 +30,8 @@
 #include <boost/beast/http/string_body.hpp>
 #include <boost/beast/http/write.hpp>
 
+#include "system/available_memory.h"
+
 namespace etendue {
 namespace {
 
@@ -113,6 +115,8 @@ std::string text_of(net::ip::address address) {
 struct Common {
     Handler* handler = nullptr;
     std::atomic<int> known = 0, event_streams = 0;
+    std::atomic<uint64_t> file_bytes =
+        0;  ///< Of the files that requests bring, until they are answered.
 };
 
 /// One connection: requests are answered one after the other.
@@ -128,6 +132,7 @@ public:
     ~Connection() {
         if (is_known_) --common_.known;
         if (is_event_stream_) --common_.event_streams;
+        release();
     }
 
     bool is_known() const { return is_known_; }
@@ -182,8 +187,37 @@ private:
         }
         read_body();
     }
+
+    /// The bytes that a file has, or has so far where its length is not known, in steps that are worth asking for memory.
+    uint64_t file_bytes() const {
+        constexpr uint64_t kStep = 16 << 20;
+        if (const auto length = parser_->content_length()) return *length;
+        return (parser_->get().body().size() + kStep - 1) / kStep * kStep;
+    }
+    /// Takes a share of what files may have, and of the memory, for the file that the request brings; a reply where there
+    /// is too little.
+    std::optional<Reply> reserve() {
+        // The body, what it is decoded to, and as much for a rendering, which should not fail beside it.
+        constexpr uint64_t kMemoryPerByte = 3;
+        const uint64_t bytes = file_bytes(), more = bytes - std::min(bytes, reserved_);
+        if (more == 0) return {};
+        if (common_.file_bytes + more > kMostFileBytesAtATime)
+            return Reply::error(503, "too many files are opened at a time; try again");
+        try {
+            require_memory(kMemoryPerByte * more, "the file");
+        } catch (const std::runtime_error& e) {
+            return Reply::error(503, e.what());
+        }
+        common_.file_bytes += more;
+        reserved_ += more;
+        return {};
+    }
+    void release() { common_.file_bytes -= std::exchange(reserved_, 0); }
+
     /// In pieces, each with its own time limit.
     void read_body() {
+        if (admission_.brings_file)
+            if (auto refusal = reserve()) return refuse(std::move(*refusal));
         if (parser_->is_done()) return on_request();
         stream_.expires_after(kTimeout);
         http::async_read_some(stream_, buffer_, *parser_,
@@ -204,15 +238,16 @@ private:
                                                        Server::kMostEventStreams)));
         }
         stream_.expires_never();
-        handler_.handle(
-            request, [self = shared_from_this(), executor = stream_.get_executor()](Reply reply) {
-                net::post(executor, [self, reply = std::move(reply)]() mutable {
-                    self->write(std::move(reply));
-                });
+        handler_.handle(std::move(request), [self = shared_from_this(),
+                                             executor = stream_.get_executor()](Reply reply) {
+            net::post(executor, [self, reply = std::move(reply)]() mutable {
+                self->write(std::move(reply));
             });
+        });
     }
 
     void write(Reply reply) {
+        release();
         body_ = reply.shared_body ? std::move(reply.shared_body)
                                   : std::make_shared<const std::string>(std::move(reply.body));
         written_ = 0;
@@ -341,7 +376,8 @@ private:
     size_t written_ = 0, discarded_ = 0;
     bool is_known_ = false;  ///< A request had the token.
     bool keep_alive_ = false, is_head_ = false, is_event_stream_ = false, is_ended_ = false;
-    Admission admission_;  ///< Of the request that is read.
+    Admission admission_;    ///< Of the request that is read.
+    uint64_t reserved_ = 0;  ///< Of common_.file_bytes.
     uint64_t seen_ = 0;
     int idle_ = 0;
 };

@@ -15,8 +15,11 @@
 #include "image/image.h"
 #include "image/image_io.h"
 #include "image_body.h"
+#include "limited_memory.h"
 #include "run_program.h"
 #include "studio/api.h"
+#include "system/available_memory.h"
+#include "system/memory_limit.h"
 #include "test_scenes.h"
 #include "wait_for.h"
 
@@ -47,7 +50,7 @@ protected:
         EXPECT_EQ(post("/v1/run", {{"action", "reload"}}).status, 200);
         ASSERT_TRUE(wait_for([&] { return session->scene_version() > before; }));
     }
-    Reply ask(const std::string& method, const std::string& target, const std::string& body = {},
+    Reply ask(const std::string& method, const std::string& target, std::string body = {},
               const std::string& version = {}) {
         std::promise<Reply> answer;
         api->handle({.method = method,
@@ -57,7 +60,7 @@ protected:
                      .fetch_site = {},
                      .authorization = "Bearer secret",
                      .if_match = version,
-                     .body = body,
+                     .body = std::move(body),
                      .local_address = "127.0.0.1"},
                     [&](Reply reply) { answer.set_value(std::move(reply)); });
         return answer.get_future().get();
@@ -461,6 +464,20 @@ TEST_F(ApiTest, ImagesOfFilesAreShownBesideRuns) {
     EXPECT_EQ(ask("DELETE", "/v1/images?image=1").status, 404);
     EXPECT_EQ(get("/v1/image?view=" + own).status, 404);
     EXPECT_EQ(state()["images"].size(), 1u);
+}
+
+/// Neither by the server's thread, which sends no events meanwhile, nor by the worker.
+TEST_F(ApiTest, FilesAreNotCopied) {
+    if (!kCanLimitMemory) GTEST_SKIP() << "sanitizers reserve memory";
+    open();
+    constexpr size_t kMebibyte = 1 << 20;
+    for (const char* name : {"a.exr", "a.etd"}) {
+        std::string bytes(64 * kMebibyte, ' ');
+        limit_memory(memory_for_data("/proc").value() + 32 * kMebibyte);
+        const Reply reply = ask("POST", std::string("/v1/images?file=") + name, std::move(bytes));
+        unlimit_memory();
+        EXPECT_EQ(reply.status, 422) << reply.body;
+    }
 }
 
 TEST_F(ApiTest, KeptRunsOfAnyFolderAreShownAsImages) {

@@ -23,9 +23,12 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "limited_memory.h"
 #include "run_program.h"
 #include "studio/api.h"
 #include "studio/guard.h"
+#include "system/available_memory.h"
+#include "system/memory_limit.h"
 #include "test_scenes.h"
 #include "wait_for.h"
 
@@ -132,7 +135,7 @@ public:
         a.brings_file = a.has_token && request.path() == "/v1/images";
         return a;
     }
-    void handle(const Request& request, std::function<void(Reply)> done) override {
+    void handle(Request request, std::function<void(Reply)> done) override {
         fail_if(fails_to_handle);
         body_bytes = request.body.size();
         if (!forgets) done(Reply::json("{}"));
@@ -323,6 +326,58 @@ TEST(Server, StatesTheLimitThatABodyExceeds) {
             EXPECT_NE(other.find("larger than 1 MiB"), std::string::npos) << other;
         }
     }
+}
+
+/// Files that are on their way have a limit together.
+TEST(Server, ReadsFewLargeFilesAtATime) {
+    StubHandler handler;
+    Server server("127.0.0.1", 0);
+    const Server::Serving serving = server.start(handler);
+    const std::string small = request_text("POST", "/v1/images?file=a.exr", "some bytes");
+    const auto status = [&] {
+        const Client client(server.port());
+        client.send(small);
+        return status_of(client.receive());
+    };
+    if (const auto free = available_memory(); free && *free < 4 * uint64_t(kMostFileBytes))
+        GTEST_SKIP() << "there is not enough memory for large files";
+    {
+        std::vector<std::unique_ptr<Client>> large;
+        for (size_t bytes = 0; bytes < kMostFileBytesAtATime; bytes += kMostFileBytes) {
+            EXPECT_EQ(status(), 200);
+            large.push_back(std::make_unique<Client>(server.port()));
+            large.back()->send(header_text("/v1/images?file=a.exr", kMostFileBytes));
+        }
+        EXPECT_TRUE(wait_for([&] { return status() == 503; }));
+        EXPECT_EQ(ask(server.port(), "POST", "/v1/run", "{}"), 200);
+    }
+    EXPECT_TRUE(wait_for([&] { return status() == 200; }));
+    // Those that were answered do not count.
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(status(), 200);
+}
+
+/// A rendering goes on in the memory that a file would take.
+TEST(Server, LeavesMemoryToRenderings) {
+    if (!kCanLimitMemory) GTEST_SKIP() << "sanitizers reserve memory";
+    StubHandler handler;
+    Server server("127.0.0.1", 0);
+    const Server::Serving serving = server.start(handler);
+    constexpr uint64_t kMebibyte = 1 << 20;
+    limit_memory(memory_for_data("/proc").value() + 100 * kMebibyte);
+    const Client client(server.port());
+    client.send(header_text("/v1/images?file=a.exr", 64 * kMebibyte));
+    const std::string reply = client.receive();
+    EXPECT_EQ(status_of(reply), 503);
+    EXPECT_NE(reply.find("the file needs 192 MiB of memory"), std::string::npos) << reply;
+    // Of a length that is not known.
+    const Client chunks(server.port());
+    chunks.send("POST /v1/images?file=a.exr HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer "
+                "secret\r\nTransfer-Encoding: chunked\r\n\r\n");
+    const std::string chunk = "100000\r\n" + std::string(kMebibyte, 'x') + "\r\n";
+    for (int i = 0; i < 64 && !chunks.is_closed(); ++i) chunks.send(chunk);
+    EXPECT_EQ(status_of(chunks.receive()), 503);
+    EXPECT_EQ(ask(server.port(), "POST", "/v1/images?file=a.exr", "some bytes"), 200);
+    unlimit_memory();
 }
 
 /// The page can be opened at each address that is printed.
