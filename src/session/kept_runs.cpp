@@ -29,32 +29,25 @@ RenderRequest request_of(const CheckpointHeader& header) {
     return r;
 }
 
-constexpr const char* kSeeds = "seeds";
-
 }  // namespace
 
 void Session::Run::save_seeds(SectionWriter& to) const {
-    to.begin(kSeeds);
-    to.put(status.request.seed);
-    to.put(uint8_t(is_counted));
-    seeds.save(to);
+    begin_seeds(status.request.seed, is_counted, seeds, to);
     series.load()->save(to);
 }
 
 void Session::Run::load_seeds(SectionReader& from) {
     const uint64_t pixels = scene().film().pixel_count();
     auto loaded_series = std::make_shared<SeedSeries>();
-    from.open(kSeeds);
-    from.get(status.request.seed);
-    is_counted = from.get<uint8_t>() != 0;
-    seeds.load(from, pixels);
+    SavedSeeds saved = open_seeds(from, pixels, status.finished_seeds);
     loaded_series->load(from, pixels);
     from.finish();
-    const auto finished = size_t(status.finished_seeds);
-    if (size_t(seeds.count()) != finished || loaded_series->luminance.size() != finished ||
-        (is_counted && finished == 0))
+    if (loaded_series->luminance.size() != size_t(status.finished_seeds))
         from.fail("the seeds of the run are damaged");
     from.close();
+    status.request.seed = saved.first;
+    is_counted = saved.is_counted;
+    seeds = std::move(saved.mean);
     series.store(std::move(loaded_series));
 }
 

@@ -6,6 +6,7 @@
 #include "image/image_io.h"
 #include "render/checkpoint.h"
 #include "session/run_folder.h"
+#include "session/run_record.h"
 
 namespace etendue {
 namespace {
@@ -17,13 +18,25 @@ OpenedImage of_checkpoint(CheckpointFile checkpoint) {
     const auto snapshot = std::make_shared<Snapshot>();
     snapshot->width = film.geometry().crop_width;
     snapshot->height = film.geometry().crop_height;
-    fill_snapshot(film, *snapshot);
+    RunStatus run;
+    load_record(checkpoint.sections(), run);
+    SavedSeeds seeds;
+    std::string of_seeds;
+    if (run.seeds > 1) {
+        seeds =
+            open_seeds(checkpoint.sections(), film.geometry().pixel_count(), run.finished_seeds);
+        of_seeds = fmt::format(", {} of {} seeds", run.finished_seeds, run.seeds);
+    }
+    if (seeds.mean.count() > 0)
+        seeds.mean.fill(seeds.is_counted ? nullptr : &film, *snapshot);
+    else
+        fill_snapshot(film, *snapshot);
     const SamplerKind sampler = sampler_named(header.condition("sampler"), "its sampler");
     return {.file = checkpoint.name(),
-            .note = fmt::format("{}, {} spp", header.integrator, film.passes()),
+            .note = fmt::format("{}, {} spp{}", header.integrator, snapshot->passes, of_seeds),
             .pixels = snapshot,
-            .interval =
-                interval_kind(estimator_named(header.estimator), sampler, film.has_groups(), 1)};
+            .interval = interval_kind(estimator_named(header.estimator), sampler, film.has_groups(),
+                                      run.seeds)};
 }
 
 }  // namespace

@@ -11,14 +11,15 @@ namespace etendue {
 
 struct OpenedImage {
     std::string file;  ///< Its name.
-    std::string note;  ///< Method and passes, where the file tells them.
+    /// Method, passes and seeds, and whether it is denoised, as far as the file tells.
+    std::string note;
     /// Those of an image file are one pass without a variance.
     std::shared_ptr<const Snapshot> pixels;
     IntervalKind interval = IntervalKind::None;
 };
 
-/// The image of a file with this name and these bytes: of a checkpoint if the name ends with RunFolder::kExtension, and of
-/// an image file otherwise. Throws std::runtime_error.
+/// The image of a file with this name and these bytes, which are those of a checkpoint or of an image file. Of a run with
+/// several seeds it is the mean of all of them. Throws std::runtime_error.
 OpenedImage opened_image(std::string bytes, const std::string& file);
 
 }  // namespace etendue

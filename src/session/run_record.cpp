@@ -11,7 +11,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* kSection = "session";
+constexpr const char *kSection = "session", *kSeeds = "seeds";
 
 /// What is thrown for a number that cannot be.
 struct ImpossibleNumber {};
@@ -90,6 +90,24 @@ bool load_record(SectionReader& from, RunStatus& run) {
     }
     from.close();
     return true;
+}
+
+void begin_seeds(uint64_t first, bool is_counted, const SeedMean& mean, SectionWriter& to) {
+    to.begin(kSeeds);
+    to.put(first);
+    to.put(uint8_t(is_counted));
+    mean.save(to);
+}
+
+SavedSeeds open_seeds(SectionReader& from, uint64_t pixels, int finished) {
+    SavedSeeds seeds;
+    from.open(kSeeds);
+    from.get(seeds.first);
+    seeds.is_counted = from.get<uint8_t>() != 0;
+    seeds.mean.load(from, pixels);
+    if (seeds.mean.count() != finished || (seeds.is_counted && finished == 0))
+        from.fail("the seeds of the run are damaged");
+    return seeds;
 }
 
 }  // namespace etendue

@@ -498,6 +498,44 @@ TEST_F(ApiTest, KeptRunsOfAnyFolderAreShownAsImages) {
     EXPECT_EQ(ask("POST", "/v1/images?file=torn.etd", file.substr(0, file.size() / 2)).status, 422);
 }
 
+/// As in the list of the runs, finished or not.
+TEST_F(ApiTest, KeptRunsOfSeveralSeedsAreShownAsTheirMean) {
+    runs = (folder.path() / "runs").string();
+    fs::create_directory(runs);
+    open();
+    const json three{{"integrator", "bdpt"}, {"spp", 3}, {"seeds", 3}};
+    const int finished = finished_run(three);
+    // One is discarded in its second seed.
+    // Ended between two seeds, or in one.
+    const int under_way = start({{"integrator", "path"}, {"spp", 50}, {"seeds", 64}});
+    ASSERT_TRUE(wait_for([&] { return session->status(under_way).finished_seeds > 0; }));
+    EXPECT_EQ(post("/v1/run", {{"action", "stop"}, {"run", under_way}}).status, 200);
+    ASSERT_TRUE(wait_for([&] { return session->status(under_way).state == RunState::Stopped; }));
+    session->settle();
+    int image = 0;
+    for (const int run : {finished, under_way}) {
+        const RunStatus status = session->status(run);
+        const Reply reply =
+            ask("POST", "/v1/images?file=elsewhere.etd", read_text(fs::path(runs) / status.file));
+        ASSERT_EQ(reply.status, 200) << status.file << reply.body;
+        const json note = json::parse(get("/v1/state").body)["images"][size_t(image)]["note"];
+        EXPECT_EQ(note, status.request.integrator + ", " + std::to_string(status.passes) +
+                            " spp, " + std::to_string(status.finished_seeds) + " of " +
+                            std::to_string(status.seeds) + " seeds");
+        const std::string view = "opened:" + std::to_string(++image), of_run = std::to_string(run);
+        ASSERT_TRUE(wait_for([&] {
+            return json::parse(get("/v1/pixel?x=3&y=4&run=" + of_run).body)["passes"] ==
+                   status.passes;
+        }));
+        const json of_file = json::parse(get("/v1/pixel?x=3&y=4&view=" + view).body),
+                   in_run = json::parse(get("/v1/pixel?x=3&y=4&run=" + of_run).body);
+        for (const char* same : {"mean", "half", "passes", "interval"})
+            EXPECT_EQ(of_file[same], in_run[same]) << same;
+        const json d = json::parse(get("/v1/difference?run=" + view + "&against=" + of_run).body);
+        EXPECT_EQ(d["rel_mse"], 0) << d;
+    }
+}
+
 TEST_F(ApiTest, OnlyFilesOfTheFolderAreOpened) {
     const auto status = [&](const json& name) {
         return post("/v1/run", {{"action", "open"}, {"file", name}}).status;
