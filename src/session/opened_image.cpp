@@ -39,6 +39,19 @@ OpenedImage of_checkpoint(CheckpointFile checkpoint) {
                                       run.seeds)};
 }
 
+/// As far as the attributes of a rendering tell, see attributes_of().
+std::string note_of(const Image& image) {
+    std::vector<std::string> parts;
+    const auto value = [&](const char* name, const auto& use) {
+        if (const auto found = image.attributes.find(name); found != image.attributes.end())
+            std::visit(use, found->second);
+    };
+    value("etendue.integrator", [&](const auto& v) { parts.push_back(fmt::format("{}", v)); });
+    value("etendue.spp", [&](const auto& v) { parts.push_back(fmt::format("{} spp", v)); });
+    if (is_denoised(image)) parts.push_back("denoised");
+    return fmt::format("{}", fmt::join(parts, ", "));
+}
+
 }  // namespace
 
 OpenedImage opened_image(std::string bytes, const std::string& file) {
@@ -50,7 +63,7 @@ OpenedImage opened_image(std::string bytes, const std::string& file) {
     snapshot->width = image.width;
     snapshot->height = image.height;
     snapshot->mean = rgb_pixels(image);
-    return {.file = file, .note = is_denoised(image) ? "denoised" : "", .pixels = snapshot};
+    return {.file = file, .note = note_of(image), .pixels = snapshot};
 }
 
 }  // namespace etendue

@@ -55,7 +55,7 @@ async function imagesPart(browser) {
     await browser.until(`${label} === 'kept.etd' && studio.shown[0].passes > 0`, 'the last one is shown');
     await browser.until("document.getElementById('pixel').textContent.match(/kept.etd, bdpt.*, 4 spp/)", 'its values');
     const rows = await browser.evaluate("[...document.querySelectorAll('#image-list .figures')].map(e => e.textContent)");
-    check(rows[0] === '64 × 48' && /^64 × 48, bdpt.*, 4 spp$/.test(rows[3]), `the list says what they are: ${rows}`);
+    check(/^64 × 48, bdpt.*, 4 spp$/.test(rows[0]) && rows[1] === '64 × 48' && /^64 × 48, bdpt.*, 4 spp$/.test(rows[3]), `the list says what they are: ${rows}`);
     check(await browser.evaluate("document.getElementById('pixel').textContent.includes('±')"), 'a kept run has intervals');
     check(await browser.evaluate("document.getElementById('histogram-text').textContent.includes('95 % below')"), 'the histogram is that of the file');
     await checkNames(browser, 'opened images');

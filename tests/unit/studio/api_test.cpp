@@ -427,9 +427,11 @@ TEST_F(ApiTest, ImagesOfFilesAreShownBesideRuns) {
     const std::string own = "opened:" + std::to_string(bring("own.exr", saved("own.exr")));
     EXPECT_NE(version(), before);
     EXPECT_NE(api->revision(), revision);
-    EXPECT_EQ(state()["images"],
-              json::array(
-                  {{{"id", 1}, {"file", "own.exr"}, {"note", ""}, {"width", 16}, {"height", 16}}}));
+    EXPECT_EQ(state()["images"], json::array({{{"id", 1},
+                                               {"file", "own.exr"},
+                                               {"note", "bdpt, 2 spp"},
+                                               {"width", 16},
+                                               {"height", 16}}}));
 
     const std::string of_run = std::to_string(run);
     EXPECT_EQ(get("/v1/image?view=" + own).body.substr(64),
