@@ -7,6 +7,7 @@
 #include "render/checkpoint.h"
 #include "session/run_folder.h"
 #include "session/run_record.h"
+#include "system/section_mark.h"
 
 namespace etendue {
 namespace {
@@ -55,7 +56,8 @@ std::string note_of(const Image& image) {
 }  // namespace
 
 OpenedImage opened_image(std::string bytes, const std::string& file) {
-    if (file.ends_with(RunFolder::kExtension))
+    // The name, too, so that a checkpoint that is damaged from its first byte on is not called an image.
+    if (bytes.starts_with(kSectionMark) || file.ends_with(RunFolder::kExtension))
         return of_checkpoint(CheckpointFile(SectionReader(std::move(bytes), file)));
     const Image image = decode_image(bytes, file);
     const auto snapshot = std::make_shared<Snapshot>();

@@ -11,17 +11,18 @@
 
 #include <fmt/format.h>
 
+#include "system/section_mark.h"
+
 namespace etendue {
 namespace {
 
 static_assert(std::endian::native == std::endian::little);
 
-constexpr char kMark[8] = {'E', 'T', 'E', 'N', 'D', 'U', 'E', '\x1a'};
 constexpr uint32_t kVersion = 6;
 constexpr size_t kMostSections = 64, kBuffer = 1 << 16;
 
 struct FileHeader {
-    char mark[8];
+    char mark[kSectionMark.size()];
     uint32_t version, zero;
 };
 
@@ -43,7 +44,7 @@ SectionWriter::SectionWriter() {
 
 void SectionWriter::write_file_header() {
     FileHeader header{{}, kVersion, 0};
-    std::copy(std::begin(kMark), std::end(kMark), header.mark);
+    kSectionMark.copy(header.mark, sizeof header.mark);
     write(&header, sizeof header);
 }
 
@@ -128,9 +129,9 @@ SectionReader::SectionReader(SectionReader&&) noexcept = default;
 SectionReader& SectionReader::operator=(SectionReader&&) noexcept = default;
 
 bool SectionReader::is_one(const std::string& file) {
-    char mark[sizeof kMark] = {};
+    char mark[kSectionMark.size()] = {};
     std::ifstream in(file, std::ios::binary);
-    return in.read(mark, sizeof mark) && std::equal(std::begin(mark), std::end(mark), kMark);
+    return in.read(mark, sizeof mark) && std::string_view(mark, sizeof mark) == kSectionMark;
 }
 
 void SectionReader::read_at(uint64_t position, void* data, size_t size) {
@@ -148,7 +149,7 @@ void SectionReader::read_table() {
     FileHeader header;
     if (bytes < sizeof header) fail("this is no state of a rendering");
     read_at(0, &header, sizeof header);
-    if (!std::equal(std::begin(kMark), std::end(kMark), header.mark))
+    if (std::string_view(header.mark, sizeof header.mark) != kSectionMark)
         fail("this is no state of a rendering");
     if (header.version != kVersion || header.zero != 0)
         fail(fmt::format("its format has version {}, but this program reads version {}",

@@ -93,7 +93,23 @@ async function imagesPart(browser) {
     await browser.until(`${banner}.includes('text.exr')`, 'a file that is no image is named');
     await open(browser, 'long.exr');
     await browser.until(`${banner} === 'long.exr is larger than 512 MiB'`, 'a file that is too long is named');
-    await open(browser, 'small.exr');
+    // Dropped beside the image; and a file that is no image before one that is.
+    await browser.evaluate(`(() => {
+        const dropped = new DataTransfer();
+        dropped.items.add(new File(['no image'], 'dropped.exr'));
+        window.isKept = ['dragover', 'drop'].map(type => {
+            const event = new DragEvent(type, {bubbles: true, cancelable: true, dataTransfer: dropped});
+            document.body.dispatchEvent(event);
+            return event.defaultPrevented;
+        });
+    })()`);
+    check(await browser.evaluate('window.isKept.every(k => k)'), 'the page stays when a file is dropped beside the image');
+    await browser.until(`${banner}.includes('dropped.exr')`, 'a file that is dropped is opened');
+    await open(browser, 'text.exr', 'small.exr');
+    await browser.until(`${banner}.includes('text.exr')`, 'a file that is no image is named');
+    await browser.until("document.querySelectorAll('#image-list .run').length === 5", 'the next one is opened');
+    check(await browser.evaluate("/^32 × 24, other size/.test(document.querySelector('#image-list .run:last-child .figures').textContent)"), 'another size is marked');
+    await browser.evaluate(press('Show small.exr'));
     await browser.until(`${banner}.includes('small.exr has 32 × 24 pixels')`, 'a file of another size is named');
 
     // Removed while it is shown on both sides.

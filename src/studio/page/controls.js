@@ -154,22 +154,23 @@ export class ImageList {
     constructor(parent, tell) {
         this.tell = tell;
         this.rows = element('div');
-        this.files = element('input', {type: 'file', id: 'image-files', multiple: true, hidden: true, accept: '.exr,.hdr,.pfm,.png,.jpg,.jpeg,.etd',
+        this.files = element('input', {type: 'file', id: 'image-files', multiple: true, hidden: true, accept: '.exr,.hdr,.pfm,.png,.jpg,.jpeg,.tga,.bmp,.pgm,.ppm,.etd',
             onchange: () => { tell.open([...this.files.files]); this.files.value = ''; }});
         parent.append(this.rows, this.files, element('button', {type: 'button', id: 'open-images', textContent: 'Open images',
-            title: 'Images and kept runs of any folder, also by dropping them on the image', onclick: () => this.files.click()}));
+            title: 'Images and kept runs of any folder, also by dropping them on the page', onclick: () => this.files.click()}));
     }
 
-    /** @param {any[]} images */
-    update(images) {
-        const key = JSON.stringify([images, this.tell.shown()]);
+    /** @param {any[]} images @param {any} scene Of its size alone an image can be shown. */
+    update(images, scene) {
+        const key = JSON.stringify([images, this.tell.shown(), scene?.width, scene?.height]);
         if (this.rows.dataset.key === key) return;
         this.rows.dataset.key = key;
         const button = (/** @type {string} */ text, /** @type {any} */ image, /** @type {(id: number) => void} */ act) => element('button', {type: 'button',
             textContent: text, 'aria-label': `${text} ${image.file}`, onclick: () => act(image.id)});
+        const fits = (/** @type {any} */ image) => !scene || (image.width === scene.width && image.height === scene.height);
         this.rows.replaceChildren(...images.map(image => element('div', {className: this.tell.shown() === viewOf(image.id) ? 'run shown' : 'run'}, [
             element('div', {className: 'name', textContent: image.file}),
-            element('div', {className: 'figures', textContent: [`${image.width} × ${image.height}`, image.note].filter(Boolean).join(', ')}),
+            element('div', {className: 'figures', textContent: [`${image.width} × ${image.height}`, fits(image) ? '' : 'other size', image.note].filter(Boolean).join(', ')}),
             element('div', {className: 'bar'}, [button('Show', image, this.tell.show), button('Remove', image, this.tell.remove)])])));
     }
 }

@@ -434,14 +434,22 @@ function showOpened(id) {
 }
 
 /**
- * Opens files one after the other, and shows the last one.
+ * Opens files one after the other, and shows the last one that is an image.
  * @param {File[]} files
  */
 async function openImages(files) {
     let last = 0;
-    for (const file of files) last = await server.openImage(file, state.most_file_bytes);
+    const problems = [];
+    for (const file of files)
+        try {
+            last = await server.openImage(file, state.most_file_bytes);
+        } catch (e) {
+            const problem = /** @type {Error} */ (e).message;
+            problems.push(problem.includes(file.name) ? problem : `${file.name}: ${problem}`);
+        }
     await update();
     if (last > 0) showOpened(last);
+    if (problems.length > 0) throw new Error(problems.join('; '));
 }
 
 function updateRuns() {
@@ -451,7 +459,7 @@ function updateRuns() {
     const others = [['0', 'nothing'], ...all.map(r => /** @type {[string, string]} */ ([String(r.id), `run ${r.id}: ${r.integrator}`]))];
     if (state?.has_reference) others.push(['reference', 'reference']);
     for (const i of state?.images ?? []) others.push([viewOf(i.id), i.file]);
-    images.update(state?.images ?? []);
+    images.update(state?.images ?? [], state?.scene);
     setOptions(tools.against, others, '0');
     if (pane === 'image') drawPlot(at('plot'), all);
 }
@@ -645,8 +653,11 @@ document.addEventListener('keydown', e => {
     else return;
     e.preventDefault();
 });
-at('view').addEventListener('dragover', (/** @type {DragEvent} */ e) => e.preventDefault());
-at('view').addEventListener('drop', (/** @type {DragEvent} */ e) => {
+// Anywhere on the page: the browser would leave it for a file that is dropped beside the image.
+const bringsFiles = (/** @type {DragEvent} */ e) => e.dataTransfer?.types.includes('Files');
+document.addEventListener('dragover', e => { if (bringsFiles(e)) e.preventDefault(); });
+document.addEventListener('drop', e => {
+    if (!bringsFiles(e)) return;
     e.preventDefault();
     report(openImages([...e.dataTransfer?.files ?? []]));
 });

@@ -468,6 +468,21 @@ TEST_F(ApiTest, ImagesOfFilesAreShownBesideRuns) {
     EXPECT_EQ(state()["images"].size(), 1u);
 }
 
+TEST_F(ApiTest, OpenedImagesHaveALimit) {
+    open();
+    const std::string file = (folder.path() / "a.pfm").string();
+    write_image(file, rgb_image(3, 2, std::vector<Rgb>(6, Rgb(0.25f))));
+    const std::string bytes = read_text(file);
+    // Of one name, too.
+    const auto status = [&] { return ask("POST", "/v1/images?file=a.pfm", bytes).status; };
+    for (size_t i = 0; i < OpenedImages::kMost; ++i) EXPECT_EQ(status(), 200) << i;
+    EXPECT_EQ(status(), 422);
+    EXPECT_EQ(json::parse(get("/v1/state").body)["images"].size(), OpenedImages::kMost);
+    EXPECT_EQ(ask("DELETE", "/v1/images?image=7").status, 200);
+    EXPECT_EQ(status(), 200);
+    EXPECT_EQ(get("/v1/image?view=opened:7").status, 404);
+}
+
 /// Neither by the server's thread, which sends no events meanwhile, nor by the worker.
 TEST_F(ApiTest, FilesAreNotCopied) {
     if (!kCanLimitMemory) GTEST_SKIP() << "sanitizers reserve memory";
@@ -497,6 +512,9 @@ TEST_F(ApiTest, KeptRunsOfAnyFolderAreShownAsImages) {
     for (const char* same : {"mean", "half", "passes", "interval"})
         EXPECT_EQ(of_file[same], in_run[same]) << same;
     EXPECT_FALSE(of_file["half"].is_null());
+    // Whatever its name.
+    EXPECT_EQ(ask("POST", "/v1/images?file=elsewhere.ETD", file).status, 200);
+    EXPECT_EQ(json::parse(get("/v1/state").body)["images"][1]["note"], "bdpt, 3 spp");
     EXPECT_EQ(ask("POST", "/v1/images?file=torn.etd", file.substr(0, file.size() / 2)).status, 422);
 }
 
