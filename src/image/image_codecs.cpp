@@ -175,15 +175,31 @@ void png_fails(png_structp png, png_const_charp message) {
 }
 void png_warns(png_structp, png_const_charp) {}
 
-struct PngReader {
-    explicit PngReader(Escape& escape)
-        : png(png_create_read_struct(PNG_LIBPNG_VER_STRING, &escape, png_fails, png_warns)),
-          info(png_create_info_struct(png)) {}
-    ~PngReader() { png_destroy_read_struct(&png, &info, nullptr); }
-    PngReader(const PngReader&) = delete;
-    PngReader& operator=(const PngReader&) = delete;
+/// The library's state. Without it, most of its functions do nothing and report no error.
+struct PngState {
+    using Destroy = void(PngState&);
+    /// Throws std::bad_alloc where the library has no memory for it.
+    PngState(png_structp made, Destroy& destroy)
+        : png(made), info(png ? png_create_info_struct(png) : nullptr), destroy(destroy) {
+        if (info) return;
+        destroy(*this);
+        throw std::bad_alloc();
+    }
+    ~PngState() { destroy(*this); }
+    PngState(const PngState&) = delete;
+    PngState& operator=(const PngState&) = delete;
+
     png_structp png;
     png_infop info;
+
+private:
+    Destroy& destroy;
+};
+struct PngReader : PngState {
+    explicit PngReader(Escape& escape)
+        : PngState(png_create_read_struct(PNG_LIBPNG_VER_STRING, &escape, png_fails, png_warns),
+                   destroy_reader) {}
+    static void destroy_reader(PngState& s) { png_destroy_read_struct(&s.png, &s.info, nullptr); }
 };
 
 struct PngHeader {
@@ -282,26 +298,23 @@ public:
     PngWriter(png_rw_ptr write, void* target, int width, int height, int channels) {
         if (!begin(write, target, width, height, channels)) fail();
     }
-    PngWriter(const PngWriter&) = delete;
-    PngWriter& operator=(const PngWriter&) = delete;
-    ~PngWriter() { png_destroy_write_struct(&png_, &info_); }
 
     void add_row(const uint8_t* codes) {
-        if (!try_to([&] { png_write_row(png_, codes); })) fail();
+        if (!try_to([&] { png_write_row(state_.png, codes); })) fail();
     }
     void end() {
-        if (!try_to([&] { png_write_end(png_, nullptr); })) fail();
+        if (!try_to([&] { png_write_end(state_.png, nullptr); })) fail();
     }
 
 private:
     bool begin(png_rw_ptr write, void* target, int width, int height, int channels) {
         return try_to([&] {
-            png_set_write_fn(png_, target, write, flush_nothing);
-            png_set_IHDR(png_, info_, png_uint_32(width), png_uint_32(height), 8,
+            png_set_write_fn(state_.png, target, write, flush_nothing);
+            png_set_IHDR(state_.png, state_.info, png_uint_32(width), png_uint_32(height), 8,
                          channels == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB,
                          PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-            png_set_sRGB(png_, info_, PNG_sRGB_INTENT_PERCEPTUAL);
-            png_write_info(png_, info_);
+            png_set_sRGB(state_.png, state_.info, PNG_sRGB_INTENT_PERCEPTUAL);
+            png_write_info(state_.png, state_.info);
         });
     }
     /// `call` must make no object with a destructor. Returns false after an error.
@@ -315,10 +328,11 @@ private:
         throw std::runtime_error(fmt::format("cannot encode a PNG: {}", escape_.message));
     }
 
+    static void destroy(PngState& s) { png_destroy_write_struct(&s.png, &s.info); }
+
     Escape escape_;
-    png_structp png_ =
-        png_create_write_struct(PNG_LIBPNG_VER_STRING, &escape_, png_fails, png_warns);
-    png_infop info_ = png_create_info_struct(png_);
+    PngState state_{png_create_write_struct(PNG_LIBPNG_VER_STRING, &escape_, png_fails, png_warns),
+                    destroy};
 };
 
 // ------------------------------------------------------------------------------------------------------- JPEG
