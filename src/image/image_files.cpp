@@ -43,7 +43,9 @@ void write_pfm(OutputFile& file, const ImageRows& image, ExrPrecision) {
 // Radiance's format: a common exponent for each pixel [Ward 1991].
 void to_rgbe(const Rgb& c, uint8_t* code) {
     constexpr float kMost = 0x1.fep126f;  // 255/256 of 2^127
-    const float largest = std::min(c.max(), kMost);
+    float largest = 0;
+    for (int i = 0; i < 3; ++i)  // without NaN
+        if (c[i] > largest) largest = std::min(c[i], kMost);
     std::fill(code, code + 4, uint8_t(0));
     if (!(largest > 1e-32f)) return;
     int exponent = 0;

@@ -15,6 +15,7 @@
 #include "error_of.h"
 #include "math/hash.h"
 #include "math/vec.h"
+#include "no_memory_for_png.h"
 #include "run_program.h"
 
 namespace etendue::test {
@@ -133,6 +134,37 @@ TEST_F(ImageIo, HdrHoldsEightBitsOfMantissa) {
     const Image read = read_image(file("a.hdr"));
     EXPECT_NEAR(read.at(0, 0, 1), 1000, 8);
     EXPECT_NEAR(read.at(1, 0, 2), 0.3f, 0.003f);
+}
+
+/// Of the other channels there is as much as without them.
+TEST_F(ImageIo, HdrHasZeroForNaN) {
+    for (int at = 0; at < 3; ++at) {
+        Rgb c(1);
+        c[at] = kNaN;
+        write_image(file("a.hdr"), rgb_image(1, 1, std::vector<Rgb>{c}));
+        const Image read = read_image(file("a.hdr"));
+        for (int i = 0; i < 3; ++i) EXPECT_NEAR(read.at(0, 0, i), i == at ? 0 : 1, 0.01f) << at;
+    }
+    write_image(file("a.hdr"), rgb_image(1, 1, std::vector<Rgb>{Rgb(kInf, -kInf, kNaN)}));
+    const Image read = read_image(file("a.hdr"));
+    EXPECT_GT(read.at(0, 0, 0), 1e37f);
+    EXPECT_EQ(read.at(0, 0, 1), 0);
+    EXPECT_EQ(read.at(0, 0, 2), 0);
+}
+
+/// Without its state, the library does nothing and reports no error.
+TEST_F(ImageIo, PngWithoutMemoryIsAnError) {
+    const Image image = sample_image({"R", "G", "B"});
+    write_image(file("a.png"), image);
+    const auto size = fs::file_size(file("a.png"));
+    for (const int what : {1, 2}) {
+        const NoMemoryForPng none(what);
+        EXPECT_THROW(write_image(file("a.png"), image), std::bad_alloc) << what;
+        EXPECT_THROW(encode_png(2, 2, std::vector<uint8_t>(12)), std::bad_alloc) << what;
+        EXPECT_ANY_THROW(read_image(file("a.png"))) << what;
+        EXPECT_EQ(fs::file_size(file("a.png")), size) << what;
+    }
+    EXPECT_NO_THROW(read_image(file("a.png")));
 }
 
 TEST_F(ImageIo, PngIsSrgbAndClamped) {
