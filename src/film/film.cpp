@@ -145,31 +145,36 @@ void Film::fold(Pass& pass, double splat_factor) {
         if (group)
             for (size_t k = 0; k < to.size(); ++k) of_eye[k] = luminance(to[k]);
         pass.add_splats(begin, to);
+        // Not in the vectors, where other threads write beside it.
+        double luminances = 0, means = 0;
         for (uint64_t i = begin; i < end; ++i) {
             const Rgb v = values[size_t(i - begin)];
             moments_[i].add(v, passes_before);
             const float y = luminance(v);
-            luminance_sum[chunk] += y;
+            luminances += double(y);
             if (keeps_largest && y > largest_[i].luminance) largest_[i] = {y, index};
-            if (second) total[chunk] += double(mean_of(i));
+            if (second) means += double(mean_of(i));
             if (group)
                 group[i] += float((1 - splat_factor) * double(of_eye[size_t(i - begin)]) +
                                   splat_factor * double(y));
             else
                 previous_[i] = second ? previous_[i] - y : y;
         }
+        luminance_sum[chunk] = luminances, total[chunk] = means;
     });
     pass_means_.push_back(sum_of_chunks(luminance_sum) / double(n));
     if (!second) return;
     const double mean = sum_of_chunks(total) / double(n);
     for_own_chunks([&](uint64_t chunk, uint64_t begin, uint64_t end) noexcept {
+        double pairs = 0, errors = 0;
         for (uint64_t i = begin; i < end; ++i) {
             // Half the squared difference of two passes estimates the variance of one pass, even if its samples are
             // correlated.
             const double scale2 = sqr(double(mean_of(i))) + 0.01 * mean * mean;
-            if (scale2 > 0) pair_sum[chunk] += 0.5 * sqr(double(previous_[i])) / scale2;
-            pass_sum[chunk] += error2_of_pass(i, mean);
+            if (scale2 > 0) pairs += 0.5 * sqr(double(previous_[i])) / scale2;
+            errors += error2_of_pass(i, mean);
         }
+        pair_sum[chunk] = pairs, pass_sum[chunk] = errors;
     });
     pair_errors_.push_back(sum_of_chunks(pair_sum) / double(n));
     error2_of_pass_ = sum_of_chunks(pass_sum) / double(n);
@@ -181,10 +186,12 @@ void Film::renew_expected() {
     std::vector<double> total(film_chunks(n));
     std::vector<float>& expected = expected_.pixels_;
     for_film_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) noexcept {
+        double sum = 0;
         for (uint64_t i = begin; i < end; ++i) {
             expected[i] = moments_[i].luminance_sum() / float(passes_);
-            total[chunk] += double(expected[i]);
+            sum += double(expected[i]);
         }
+        total[chunk] = sum;
     });
     double mean = 0;
     for (const double t : total) mean += t;
@@ -247,8 +254,9 @@ ErrorEstimate Film::group_error() const {
     const size_t pairs = group_sums_.size() / 2;
     std::vector<double> luminance_sum(chunks), error_sum(chunks * pairs);
     for_film_chunks(n, [&](uint64_t chunk, uint64_t begin, uint64_t end) noexcept {
-        for (uint64_t i = begin; i < end; ++i)
-            luminance_sum[chunk] += double(moments_[i].luminance_sum());
+        double sum = 0;
+        for (uint64_t i = begin; i < end; ++i) sum += double(moments_[i].luminance_sum());
+        luminance_sum[chunk] = sum;
     });
     double mean = 0;
     for (const double sum : luminance_sum) mean += sum;
@@ -304,7 +312,9 @@ void Film::renew_error2_of_pass() {
     const double mean = mean_luminance().mean;
     std::vector<double> error_sum(chunks);
     for_film_chunks(pixels, [&](uint64_t chunk, uint64_t begin, uint64_t end) noexcept {
-        for (uint64_t i = begin; i < end; ++i) error_sum[chunk] += error2_of_pass(i, mean);
+        double sum = 0;
+        for (uint64_t i = begin; i < end; ++i) sum += error2_of_pass(i, mean);
+        error_sum[chunk] = sum;
     });
     double error2 = 0;
     for (const double sum : error_sum) error2 += sum;
@@ -342,10 +352,21 @@ Film::MeanEstimate Film::mean_luminance() const {
     for (double v : pass_means_) m.mean += v / n;
     if (has_groups()) {
         if (!has_all_groups()) return m;
+        const size_t groups = group_sums_.size();
+        std::vector<double> sums(film_chunks(moments_.size()) * groups);
+        for_film_chunks(moments_.size(),
+                        [&](uint64_t chunk, uint64_t begin, uint64_t end) noexcept {
+                            for (size_t g = 0; g < groups; ++g) {
+                                double sum = 0;
+                                for (uint64_t i = begin; i < end; ++i)
+                                    sum += double(group_sums_[g][i]);
+                                sums[chunk * groups + g] = sum;
+                            }
+                        });
         etendue::Moments means;
-        for (size_t g = 0; g < group_sums_.size(); ++g) {
+        for (size_t g = 0; g < groups; ++g) {
             double sum = 0;
-            for (const float y : group_sums_[g]) sum += double(y);
+            for (size_t at = g; at < sums.size(); at += groups) sum += sums[at];
             means.add(sum / (double(group_passes_[g]) * double(moments_.size())));
         }
         m.standard_error = std::sqrt(means.squared_error());

@@ -405,6 +405,27 @@ TEST(Film, PassesAfterADroppedOneAreAsWithoutIt) {
     totals(true).expect_same_bits(totals(false));
 }
 
+/// Also sums over several chunks, of films with and without groups.
+TEST(Film, TotalsDoNotDependOnTheThreads) {
+    constexpr FilmGeometry kLarge{130, 100, 0, 0, 130, 100};
+    const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, 8);
+    for (const int groups : {0, 4}) {
+        const auto totals = [&](int threads) {
+            ThreadArena arena(threads);
+            return arena.execute([&] {
+                Film film(kLarge, ReconstructionFilter::box());
+                if (groups > 0) film.set_groups(groups);
+                Passes passes(film);
+                for (int i = 0; i < 12; ++i) passes.add(500);
+                return Totals(film, true);
+            });
+        };
+        const Totals one = totals(1);
+        EXPECT_TRUE(one.error.valid);
+        for (const int threads : {2, 7}) one.expect_same_bits(totals(threads));
+    }
+}
+
 /// The largest passes are those of the differences of the totals, for any number of threads.
 TEST(Film, NotesTheBrightestPassOfEachPixel) {
     constexpr int kPasses = 10;

@@ -91,6 +91,17 @@ TEST(SplatBuffer, DoesNotWrap) {
     }
 }
 
+/// Splats of several pixels, as of a wide filter.
+TEST(SplatBuffer, RowsDoNotWrap) {
+    for (const float sign : {1.0f, -1.0f}) {
+        SplatBuffer buffer(2, 1, 1);
+        for (int i = 0; i < 1 << 22; ++i)
+            buffer.add(0, 0, {sign * 1023.5f, 0, 0}, {{1, 0.5f}}, {{1}});
+        EXPECT_EQ(folded(buffer, 2),
+                  (std::vector<float>{sign * 1023.5f * 0x1p22f, sign * 1023.5f * 0x1p21f}));
+    }
+}
+
 TEST(SplatBuffer, RadianceOf1e8OnOnePixelDoesNotWrap) {
     SplatBuffer buffer(1, 1, 1);
     for (int i = 0; i < 1 << 20; ++i) buffer.add(0, {1e8f, 100, 1e12f});
