@@ -60,6 +60,7 @@ struct Contender {
     std::string in_pilots;          ///< The method with parameters for short runs.
     std::shared_ptr<const Guide> guide = nullptr;
     std::string unguided = "";  ///< The method of which this is the one with a guide.
+    bool has_light = false;     ///< Whether its last pilot has met any.
     MethodPilot pilot;
     /// Of the last pilot; 0: there was none.
     struct History {
@@ -177,7 +178,9 @@ public:
         const bool has_seen_noise =
             std::any_of(choice.candidates.begin(), choice.candidates.end(),
                         [](const auto& k) { return k.images > 0 && k.error() > 0; });
-        const std::string best = has_seen_noise ? contenders_.front().method() : kWithoutPilots;
+        const bool differs = contenders_.front().has_light != contenders_.back().has_light;
+        const std::string best =
+            has_seen_noise || differs ? contenders_.front().method() : kWithoutPilots;
         std::stable_partition(choice.candidates.begin(), choice.candidates.end(),
                               [&](const auto& k) { return k.method == best; });
         choice.chosen = spec_of(best).to_string();
@@ -283,6 +286,8 @@ private:
             const double before = budget_.seconds();
             double shortest = std::numeric_limits<double>::infinity();
             for (const Contender& c : contenders_) {
+                // Without light there is no error to judge by.
+                if (!c.has_light) continue;
                 shortest = std::min(shortest, seconds_until(sqr(*budget_.error()), c.shown.error(),
                                                             before, c.shown.start_seconds));
             }
@@ -293,6 +298,7 @@ private:
         // Of equal ones, the cheaper one.
         std::stable_sort(contenders_.begin(), contenders_.end(),
                          [](const Contender& a, const Contender& b) {
+                             if (a.has_light != b.has_light) return a.has_light;
                              return a.shown.error() < b.shown.error();
                          });
     }
@@ -319,6 +325,7 @@ private:
         for (size_t i = 0; i < scores.size(); ++i) {
             contenders_[i].shown.noise = scores[i].noise;
             contenders_[i].shown.missing = scores[i].missing;
+            contenders_[i].has_light = scores[i].has_light;
         }
     }
 

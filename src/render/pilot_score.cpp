@@ -8,8 +8,12 @@
 namespace etendue {
 namespace {
 
-double standard_error(const Moments& m) {
-    return std::sqrt(m.squared_error());
+/// The mean less its standard error; 0 where the difference is a matter of rounding: the error of light that only one of the
+/// values has is its mean.
+double low_mean(const Moments& m) {
+    constexpr double kRounding = 1e-9;
+    const double low = m.mean() - std::sqrt(m.squared_error());
+    return low > kRounding * m.mean() ? low : 0.0;
 }
 
 /// Variance of independent values, of which differences d beyond V count V |d| instead of d². From pairs, since a mean would
@@ -44,6 +48,7 @@ public:
     std::vector<PilotScore> all() const {
         constexpr int kGroups = 4;
         std::vector<PilotScore> scores(methods_.size());
+        for (size_t i = 0; i < methods_.size(); ++i) scores[i].has_light = has_light(methods_[i]);
         add_noise(scores);
         for (const Tiles& t :
              {finest_, tiles(kMostColumns / kGroups, kMostRows / kGroups), tiles(1, 1)})
@@ -56,6 +61,11 @@ private:
     static constexpr int kMostColumns = 16, kMostRows = 12;
     Tiles tiles(int columns, int rows) const {
         return {width_, height_, std::min(columns, width_), std::min(rows, height_)};
+    }
+    static bool has_light(const PilotImages& of) {
+        return std::any_of(of.images.begin(), of.images.end(), [](const auto& image) {
+            return std::any_of(image.begin(), image.end(), [](float value) { return value > 0; });
+        });
     }
     /// The mean of a tile in each image of a method.
     std::vector<Moments> estimates(const Tiles& tiles, const PilotImages& of) const {
@@ -91,8 +101,7 @@ private:
         for (const PilotImages& of : methods_) m.by_method.push_back(estimates(tiles, of));
         for (size_t t = 0; t < size_t(tiles.count()); ++t) {
             m.mu.push_back(0);
-            for (const auto& of : m.by_method)
-                m.mu.back() = std::max(m.mu.back(), of[t].mean() - standard_error(of[t]));
+            for (const auto& of : m.by_method) m.mu.back() = std::max(m.mu.back(), low_mean(of[t]));
             m.whole += m.mu.back() / double(tiles.count());
         }
         return m;
@@ -166,11 +175,13 @@ private:
         const auto count = size_t(tiles.count());
         for (size_t i = 0; i < methods_.size(); ++i) {
             std::vector<double> lacks(count);
+            const bool is_certain = count == 1 && !scores[i].has_light;
             for (size_t j = 0; j < methods_.size(); ++j) {
                 const size_t images =
                     std::min(methods_[i].images.size(), methods_[j].images.size());
                 const double errors =
-                    student_quantile(2 * kDoubt / double(count), double(images) - 1);
+                    is_certain ? 0.0
+                               : student_quantile(2 * kDoubt / double(count), double(images) - 1);
                 for (size_t t = 0; t < count; ++t) {
                     const Moments &own = m.by_method[i][t], &other = m.by_method[j][t];
                     const double error = std::sqrt(own.squared_error() + other.squared_error());

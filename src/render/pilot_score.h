@@ -13,7 +13,8 @@
 // - Missing light: where the mean of a method certainly lies below that of another one, it lacks light that the other one
 //   has, and will find it in spikes. The lower limit δ of the difference counts V δ, like the energy of spikes that were
 //   met. It is looked for in tiles, in groups of them, and in the whole film; the level with the largest sum counts. The
-//   limits of two methods hold with a probability of 99 % in all tiles of a level.
+//   limits of two methods hold with a probability of 99 % in all tiles of a level. A method whose images are all black lacks
+//   what another one has met, however rarely: light is never negative, so that this is certain.
 //
 // The images of chains are those of independent chains, so that the disagreement of chains is their noise. It depends on
 // the size of pixels: states that follow each other are near each other, in one large pixel, but in several small ones. If
@@ -42,6 +43,7 @@ struct PilotImages {
 
 struct PilotScore {
     double noise = 0, missing = 0;
+    bool has_light = false;  ///< Whether any of its images has.
     double error() const { return noise + missing; }
 };
 

@@ -60,6 +60,26 @@ TEST(MethodChoice, IsSensible) {
     EXPECT_NE(chosen("lantern.xml"), "path");
 }
 
+/// A lamp in a glass ball, which eye paths never find, and light paths rarely: most of them start outside of the room.
+TEST(MethodChoice, IsNoMethodThatFindsNoLightWhereAnotherOneDoes) {
+    const Scene scene = build(
+        front_camera(32) + room() + sphere("0,0.2,0", "0.3", kGlass) +
+        sphere("0,0.2,0", "0.0005",
+               "<emitter type=\"area\"><rgb name=\"radiance\" value=\"40000\"/></emitter>") +
+        rectangle("<scale value=\"0.25\"/><rotate y=\"1\" angle=\"180\"/><translate z=\"-3\"/>",
+                  "<emitter type=\"area\"><rgb name=\"radiance\" value=\"1500\"/></emitter>"));
+    int black = 0;
+    for (uint64_t seed = 0; seed < 6; ++seed) {
+        SCOPED_TRACE(seed);
+        RenderSettings settings = settings_of(scene, "auto:chains=false", 20);
+        settings.seed = seed;
+        const MethodChoice choice = *with_chosen_method(scene, settings).choice;
+        for (const auto& c : choice.candidates) black += c.method == "path" && c.noise == 0;
+        EXPECT_NE(IntegratorSpec::parse(choice.chosen).name, "path");
+    }
+    EXPECT_GE(black, 3);
+}
+
 TEST(MethodChoice, IsAFunctionOfSceneSeedAndBudget) {
     const Scene scene = scene_of_project("ring.xml", 160, 120);
     RenderSettings settings = settings_of(scene, "auto", 4);

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "math/hash.h"
+#include "math/vec.h"
 
 namespace etendue::test {
 namespace {
@@ -179,6 +180,37 @@ TEST(PilotScore, OfBlackImagesIsZero) {
     const Value black = [](int, int, int, Numbers&) { return 0.0; };
     for (const PilotScore& s : score({images(4, 1, black), images(4, 2, black)}))
         EXPECT_EQ(s.error(), 0);
+}
+
+/// Any light that one method has met proves that a black one lacks it, even where too few images have it for a test.
+TEST(PilotScore, BlackIsNotCalm) {
+    const Value black = [](int, int, int, Numbers&) { return 0.0; };
+    for (const int every : {3, 4, 6}) {
+        SCOPED_TRACE(every);
+        const Value rare = [=](int x, int y, int image, Numbers&) {
+            return image % every == 2 && x == 9 && y == 4 ? 100.0 : 0.0;
+        };
+        const auto s = score({images(12, 1, black), images(12, 2, rare)});
+        EXPECT_FALSE(s[0].has_light);
+        EXPECT_TRUE(s[1].has_light);
+        EXPECT_GT(s[1].noise, 0);
+        EXPECT_GT(s[0].error(), s[1].error());
+    }
+}
+
+/// The error of light that one image alone has is its mean. Rounding decides nothing.
+TEST(PilotScore, LightInOneImageHasNoNoiseThatIsKnown) {
+    const Value black = [](int, int, int, Numbers&) { return 0.0; };
+    for (int value = 1; value < 100; ++value) {
+        const Value once = [=](int x, int y, int image, Numbers&) {
+            return image == value % 12 && x == 9 && y == 4 ? value / 7.0 : 0.0;
+        };
+        const auto s = score({images(12, 1, black), images(12, 2, once)});
+        EXPECT_FALSE(s[0].has_light);
+        EXPECT_TRUE(s[1].has_light);
+        EXPECT_EQ(s[1].noise, 0) << value;
+        EXPECT_EQ(s[0].missing, 0) << value;
+    }
 }
 
 /// Images of which two and two complement each other, apart from a part that is independent.
