@@ -12,6 +12,7 @@
 
 #include "description/json_text.h"
 #include "integrator/auto.h"
+#include "render/candidates.h"
 #include "render/cost_table.h"
 #include "render/learned_guide.h"
 #include "render/pilot_rendering.h"
@@ -74,9 +75,8 @@ struct Contender {
     }
     const std::string& method() const { return shown.method; }
     std::string name() const { return IntegratorSpec::parse(method()).name; }
-    /// Whether eye paths meet the light paths of all pixels, of which there are few in pilots.
-    bool reuses_light_paths() const { return method().starts_with("upg") || method() == "vcm"; }
-    bool has_chains() const { return method().ends_with("mlt"); }
+    bool reuses_light_paths() const { return candidate_method(method()).reuses_light_paths; }
+    bool has_chains() const { return candidate_method(method()).has_chains; }
     /// Pilots with chains are too few to tell what a guide gains there.
     bool can_have_guide() const {
         if (has_chains()) return false;
@@ -92,20 +92,24 @@ struct Contender {
     }
 };
 
-/// In the order in which they are tried: the cheapest first.
+/// Those that may take part, in the order in which they are tried.
 std::vector<Contender> contenders(const Scene& scene, const IntegratorParams& asked, int ranks) {
     // Chains have few states in pilots, and need as many for each as in the rendering. Of the groups, two suffice.
     constexpr const char* kChains = ":groups=2,chains=16";
     constexpr int kShortestOfChains = 3;
     const int max_depth = asked.integer("max_depth");
+    const bool may_have_chains =
+        asked.flag("chains") && ranks == 1 && (max_depth < 0 || max_depth >= kShortestOfChains);
+    const auto may_be = [&](const CandidateMethod& m) {
+        const std::string_view name = m.name;
+        // What light of emitters without extent reaches by way of mirrors and glass, eye paths never find.
+        if (name == "path") return !scene.has_delta_emitters();
+        if (name == "vcm") return asked.flag("consistent");
+        return !m.has_chains || may_have_chains;
+    };
     std::vector<Contender> all;
-    // What light of emitters without extent reaches by way of mirrors and glass, eye paths never find.
-    if (!scene.has_delta_emitters()) all.push_back(Contender::of("path"));
-    for (const char* name : {"bdpt", "pcbpt"}) all.push_back(Contender::of(name));
-    if (asked.flag("consistent")) all.push_back(Contender::of("vcm"));
-    all.push_back(Contender::of("upg+bdpt"));
-    if (asked.flag("chains") && ranks == 1 && (max_depth < 0 || max_depth >= kShortestOfChains))
-        for (const char* name : {"mlt", "mmlt"}) all.push_back(Contender::of(name, kChains));
+    for (const CandidateMethod& m : kCandidateMethods)
+        if (may_be(m)) all.push_back(Contender::of(m.name, m.has_chains ? kChains : ""));
     return all;
 }
 
@@ -174,7 +178,7 @@ public:
         MethodChoice choice;
         choice.asked = with_all_params(settings_.integrator);
         choice.candidates = candidates();
-        // Where no pilot has met light with noise, all are equal.
+        // Where no pilot has met light with noise, all are equal, unless some have met light and others have not.
         const bool has_seen_noise =
             std::any_of(choice.candidates.begin(), choice.candidates.end(),
                         [](const auto& k) { return k.images > 0 && k.error() > 0; });
@@ -295,7 +299,7 @@ private:
             score(width, height, ratio);
             apply(factors);
         }
-        // Of equal ones, the cheaper one.
+        // Of equal ones, the cheaper one. What has met no light tells nothing, and comes last.
         std::stable_sort(contenders_.begin(), contenders_.end(),
                          [](const Contender& a, const Contender& b) {
                              if (a.has_light != b.has_light) return a.has_light;
@@ -318,7 +322,7 @@ private:
             // If there is no time left after the start, the method is hopeless.
             p.images.horizon = std::max(0.01, (budget_.seconds() - c.shown.start_seconds) /
                                                   std::max(image, 1e-12));
-            p.images.pixels_in_one = p.has_chains ? ratio : 1;
+            p.images.pixels_in_one = c.has_chains() ? ratio : 1;
             images.push_back(p.images);
         }
         const std::vector<PilotScore> scores = score_pilots(images, width, height);
@@ -336,7 +340,7 @@ private:
         std::vector<NoiseOfFilms> noise;
         for (Contender& c : contenders_) {
             const double now = c.pilot.image_noise(c.shown.noise);
-            noise.push_back({.kind = c.pilot.has_chains       ? Kind::Chains
+            noise.push_back({.kind = c.has_chains()           ? Kind::Chains
                                      : c.reuses_light_paths() ? Kind::Reuse
                                                               : Kind::Independent,
                              .before = c.history.image_noise,

@@ -80,7 +80,6 @@ void add_replicate(const Scene& small, RenderSettings settings, uint64_t number,
         drop, drop);
     if (reason == StopReason::Interrupted) throw PassDropped();
 
-    pilot.has_chains = groups > 0;
     pilot.passes_per_image = made.passes_per_image();
     pilot.images.in_sequence =
         settings.sampler == SamplerKind::Sobol && groups == 0 ? int(made.images.size()) : 1;

@@ -15,7 +15,6 @@ constexpr int kPilotReplicates = 3, kPilotPasses = 4;
 /// What pilots of one candidate on one film have shown.
 struct MethodPilot {
     PilotImages images;
-    bool has_chains = false;
     int passes_per_image = 1;
     double pass_seconds = 0;   ///< Simulated.
     double start_seconds = 0;  ///< Simulated, of what was made once.

@@ -7,12 +7,15 @@
 #include <filesystem>
 #include <thread>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "error_of.h"
 #include "integrator/auto.h"
 #include "math/statistics.h"
+#include "render/candidates.h"
+#include "render/cost_table.h"
 #include "render/pilot_rendering.h"
 #include "render/render_request.h"
 #include "sampler/pilot_seed.h"
@@ -211,6 +214,24 @@ TEST(MethodChoice, CandidatesAreThoseThatMayBe) {
               "<emitter type=\"point\"><point name=\"position\" value=\"0,0.5,0\"/></emitter>");
     EXPECT_EQ(methods_of(choice_of(lit_by_point)),
               (Names{"bdpt", "mlt", "mmlt", "pcbpt", "upg+bdpt"}));
+}
+
+/// What `auto` knows of methods is what they are, whatever their parameters.
+TEST(Candidates, AreWhatTheirIntegratorsAre) {
+    for (const CandidateMethod& m : kCandidateMethods) {
+        SCOPED_TRACE(m.name);
+        EXPECT_GT(typical_sample_seconds(m.name), 0);
+        for (const std::string guide : {"off", "auto"}) {
+            const std::string method = fmt::format("{}:guide={}", m.name, guide);
+            const auto integrator = make_integrator(IntegratorSpec::parse(method));
+            EXPECT_EQ(candidate_method(method).name, m.name);
+            EXPECT_EQ(candidate_method(method).has_chains, integrator->error_groups() > 0);
+            const std::string name = m.name;
+            EXPECT_EQ(candidate_method(method).reuses_light_paths,
+                      name == "vcm" || name == "upg+bdpt");
+        }
+    }
+    EXPECT_THROW(candidate_method("upg"), std::logic_error);
 }
 
 /// What is rendered without a word about the method, also where there is little to render, or no light.
