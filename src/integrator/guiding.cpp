@@ -361,10 +361,9 @@ bool Guiding::gains_nothing(const Guide& guide, GuidedWalks walks) const {
     // Neither what emission gains nor adjoint-driven roulette depends on them. In the scenes of docs/guiding.md, one of the
     // two gains 2.9 nats, or both at most 0.3: on veach-bidir, where guided directions make a sample worse.
     constexpr float kLeastGain = 0.5f;
-    const bool has_gains = mode_ != Mode::Footprints && !given_;
     if (mode_ == Mode::Auto && walks == GuidedWalks::Eye)
         return guide.surfaces.gain(TransportMode::Radiance) < kLeastGainAlone;
-    return joins_both(walks) && has_gains &&
+    return joins_both(walks) && mode_ != Mode::Footprints &&
            std::max(guide.surfaces.gain(TransportMode::Radiance),
                     guide.surfaces.gain(TransportMode::Importance)) < kLeastGain;
 }
@@ -401,7 +400,7 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
     if (is_given_up_) next = nullptr;
     if (next) {
         next->has_roulette = has_roulette_;
-        next->uses_surfaces = !gains_nothing(*next, walks);
+        if (!given_) next->uses_surfaces = !gains_nothing(*next, walks);
     }
     guide_ = std::move(next);
     refits_ = refits;

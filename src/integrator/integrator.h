@@ -88,7 +88,8 @@ struct IntegratorSpec {
     /// Makes an integrator that is not in the registry; otherwise empty.
     std::function<std::unique_ptr<Integrator>(const std::map<std::string, std::string>& params)>
         make = nullptr;
-    /// The guide of an integrator with guide=on, which then learns none; otherwise empty. For tests.
+    /// The guide of an integrator with guide=on, which takes it as it is and learns none; otherwise empty. For tests, and for
+    /// the pilots of `auto`.
     std::shared_ptr<const Guide> guide = nullptr;
 
     /// Throws std::runtime_error with one clear message.

@@ -204,6 +204,30 @@ TEST(LearnedGuides, AreThoseOfARendering) {
     }
 }
 
+std::map<std::string, double> figures_of(const Scene& scene, const IntegratorSpec& integrator) {
+    RenderSettings settings;
+    settings.integrator = integrator;
+    settings.spp = 1;
+    Renderer renderer(scene, settings);
+    renderer.run([](const Progress&) {}, std::atomic<bool>{false});
+    std::map<std::string, double> figures;
+    for (const auto& [name, value] : renderer.integrator().figures()) figures[name] = value;
+    return figures;
+}
+
+/// A guide that is given, as to the pilots of `auto`, guides what it guides in the rendering for which it was learned.
+TEST(LearnedGuides, AreUsedAsTheyAreGiven) {
+    const Scene scene = test::build(test::front_camera(16) + test::room() + test::area_lamp());
+    Guide guide = learn(scene, "bdpt:guide_walks=4000").guide();
+    for (const bool at_surfaces : {false, true})
+        for (const char* method : {"bdpt:guide=on", "path:guide=on", "upg+bdpt:guide=on"}) {
+            guide.uses_surfaces = at_surfaces;
+            IntegratorSpec spec = IntegratorSpec::parse(method);
+            spec.guide = std::make_shared<const Guide>(guide);
+            EXPECT_EQ(figures_of(scene, spec)["guided_surfaces"], double(at_surfaces)) << method;
+        }
+}
+
 /// All methods that have the parameter, chains among them.
 TEST(LearnedGuides, ExistForEachMethodThatHasOne) {
     const Scene scene = test::build(test::front_camera(8) + test::room() + test::area_lamp());
