@@ -73,7 +73,8 @@ public:
         return {scene,
                 counts,
                 stats,
-                {depth_.max_depth + scene.sensor().has_finite_lens(), depth_.rr_depth},
+                {depth_.max_depth + scene.sensor().has_finite_lens(), depth_.rr_depth,
+                 depth_.has_roulette},
                 learned};
     }
 

@@ -149,13 +149,14 @@ std::unique_ptr<Integrator> make_integrator(const IntegratorSpec& spec);
 struct DepthOptions {
     int max_depth;  ///< Edges of the longest path; kUnlimited if there is no limit.
     int rr_depth;
+    bool has_roulette = true;  ///< Whether walks have any; see WalkOptions.
 
     static DepthOptions from(const IntegratorParams& params);
     /// The same without Russian roulette.
     static DepthOptions without_roulette(const IntegratorParams& params);
     /// Limits of walks: sub-paths end at the last vertex that can be part of a path of max_depth edges.
     WalkOptions walk() const {
-        return {max_depth == kUnlimited ? kUnlimited : max_depth + 1, rr_depth};
+        return {max_depth == kUnlimited ? kUnlimited : max_depth + 1, rr_depth, has_roulette};
     }
     static constexpr int kUnlimited = 1 << 20;
 };

@@ -2,10 +2,10 @@
 // of its random numbers chooses. Each path length has its own chains. Unbiased.
 //
 // The contribution of C(s,t) of length k is C·w/p(s|k), with the weights of bidirectional path tracing. A pilot fixes
-// p(s|k): four fifths are proportional to the energy of each technique, and one fifth is uniform. Walks have no Russian
-// roulette. The last class contains all longer paths; its states also choose their length, four fifths in proportion to
-// the energy of each length, and one fifth from a geometric distribution. Only large and block steps change the technique
-// and the length.
+// p(s|k): four fifths are proportional to the energy of each technique, and one fifth is uniform. The walks of states have no
+// Russian roulette, not even that of a guide; those of the samples in which chains find their first states have. The last class
+// contains all longer paths; its states also choose their length, four fifths in proportion to the energy of each length, and
+// one fifth from a geometric distribution. Only large and block steps change the technique and the length.
 
 #include "integrator/mmlt.h"
 
@@ -139,10 +139,16 @@ private:
                        Workspace& work) const {
         const auto add = [&](const std::optional<Join>& j) { paths_.add(c, j, work, factor); };
         SubPath &y = work.y, &z = work.z;
-        const int rr_depth = paths_.depth().rr_depth;
+        // A state reads no numbers of roulette. Those of a find are not uniform: its walk, which has other probabilities of
+        // survival, has left a part of them.
+        const auto upto = [&](int vertices) {
+            WalkOptions options = paths_.depth().walk();
+            options.max_vertices = vertices;
+            return options;
+        };
         // The last flight of C(s,0) ends on the lens. Its ray also hits the surface behind the lens, which is not needed.
-        const WalkContext light{c.scene, n, work.stats, {s, rr_depth}};
-        const WalkContext eye{c.scene, n, work.stats, {t, rr_depth}};
+        const WalkContext light{c.scene, n, work.stats, upto(s)};
+        const WalkContext eye{c.scene, n, work.stats, upto(t)};
         if (s >= 2) {
             if (!start_light_path(light, c.sampler, y)) return;
             // The loop must not take another step, since that would overwrite y.flight.

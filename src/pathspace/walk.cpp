@@ -55,6 +55,7 @@ float throughput_survival(const SubPath& path) {
 template <TransportMode mode>
 std::optional<Survival> survival(const WalkContext& walk, SubPath& path) {
     constexpr float kMost = 0.95f;
+    if (!walk.options.has_roulette) return {};
     const bool is_late = path.size() - 1 >= walk.options.rr_depth;
     const std::optional<float> adjoint = adjoint_survival<mode>(walk, path);
     if (!is_late) return adjoint ? std::optional(Survival(*adjoint)) : std::nullopt;

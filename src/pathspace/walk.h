@@ -15,6 +15,7 @@ namespace etendue {
 struct WalkOptions {
     int max_vertices = 1 << 20;  ///< Of the sub-path, its first vertex included.
     int rr_depth = 5;            ///< Russian roulette from the vertex with this index on.
+    bool has_roulette = true;    ///< Whether there is any; otherwise not even that of a guide.
 };
 
 /// Data learned by an integrator as a function of position; every vertex looks it up once, when it is appended.

@@ -119,6 +119,20 @@ TEST_F(GuidedRoulette, OfLightPathsFollowsTheirContributions) {
     expect_survival_by_contribution<kLight>();
 }
 
+TEST_F(GuidedRoulette, IsNoneInWalksWithoutRoulette) {
+    const Guide guide = guide_of_contributions();
+    const TechniqueCounts counts{.hit = 1, .next_event = 1, .guide = &guide};
+    const WalkContext context{
+        scene, counts, stats, {.max_vertices = kVertices, .rr_depth = 2, .has_roulette = false}};
+    SubPath path;
+    for (uint32_t index = 0; index < 1000; ++index) {
+        Sampler sampler(SamplerKind::Independent, 3);
+        sampler.start(index, index % 64);
+        trace_eye_path(context, film, index % 64, sampler, path);
+        for (int i = 1; i < path.size(); ++i) ASSERT_EQ(path[i].survival.value(), 1) << i;
+    }
+}
+
 TEST_F(GuidedRoulette, UnknownContributionsChangeNothing) {
     Guide unknown = guide_of_contributions();
     GuideCell cell;

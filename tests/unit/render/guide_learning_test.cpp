@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "pathspace/walk.h"
+#include "random_guide.h"
 #include "render/learned_guide.h"
 #include "render/renderer.h"
 #include "test_scenes.h"
@@ -226,6 +227,26 @@ TEST(LearnedGuides, AreUsedAsTheyAreGiven) {
             spec.guide = std::make_shared<const Guide>(guide);
             EXPECT_EQ(figures_of(scene, spec)["guided_surfaces"], double(at_surfaces)) << method;
         }
+}
+
+/// States of `mmlt` have no roulette, not even that of a guide. With this one, it would end nine of ten walks at each vertex.
+TEST(LearnedGuides, EndNoStatesOfMmlt) {
+    const Scene scene = test::build(test::front_camera(16) + test::room() + test::area_lamp());
+    Guide guide = test::random_guide(scene, 20, 1);
+    guide.uses_surfaces = false;
+    GuideCell cell = guide.surfaces.cells()[0];
+    for (GuideCell::Field& field : cell.fields) field.contribution.fill({1, 1e-6f});
+    guide.surfaces = GuideTree(cell);
+    const auto zero = [&](const std::string& roulette) {
+        IntegratorSpec spec = IntegratorSpec::parse(
+            "mmlt:groups=2,chains=16,p_large=1,mutations=32,max_depth=5,guide=on,guide_roulette=" +
+            roulette);
+        spec.guide = std::make_shared<const Guide>(guide);
+        return figures_of(scene, spec)["large_zero"];
+    };
+    const double without = zero("false");
+    EXPECT_LT(without, 0.8);
+    EXPECT_NEAR(zero("true"), without, 0.1);
 }
 
 /// All methods that have the parameter, chains among them.
