@@ -235,17 +235,14 @@ std::unique_ptr<Integrator> make_integrator(const IntegratorSpec& spec) {
     return entry.make(IntegratorParams(spec, entry.info));
 }
 
-DepthOptions DepthOptions::without_roulette(const IntegratorParams& params) {
+DepthOptions DepthOptions::from(const IntegratorParams& params) {
     const int max_depth = params.integer("max_depth");
     if (max_depth < -1 || max_depth == 0)
         throw std::runtime_error("max_depth must be -1 (unlimited) or at least 1");
-    return {max_depth < 0 ? kUnlimited : std::min(max_depth, kUnlimited), kUnlimited, false};
-}
-
-DepthOptions DepthOptions::from(const IntegratorParams& params) {
-    DepthOptions depth = without_roulette(params);
+    DepthOptions depth{max_depth < 0 ? kUnlimited : std::min(max_depth, kUnlimited), kUnlimited,
+                       params.has("rr_depth")};
+    if (!depth.has_roulette) return depth;
     depth.rr_depth = params.integer("rr_depth");
-    depth.has_roulette = true;
     if (depth.rr_depth < 1) throw std::runtime_error("rr_depth must be at least 1");
     constexpr int kLatestRoulette = RenderDefaults::kLatestRoulette;
     if (depth.rr_depth > kLatestRoulette && depth.max_depth > kLatestRoulette)

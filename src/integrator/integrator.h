@@ -108,6 +108,8 @@ struct Choice {
 class IntegratorParams {
 public:
     IntegratorParams(const IntegratorSpec& spec, const PluginInfo& info);
+    /// Whether the integrator has this parameter.
+    bool has(const char* name) const { return values_.count(name) > 0; }
     int integer(const char* name) const;
     float number(const char* name) const;
     bool flag(const char* name) const;
@@ -151,9 +153,8 @@ struct DepthOptions {
     int rr_depth;
     bool has_roulette = true;  ///< Whether walks have any; see WalkOptions.
 
+    /// Without roulette where the integrator has no parameter rr_depth.
     static DepthOptions from(const IntegratorParams& params);
-    /// The same without Russian roulette.
-    static DepthOptions without_roulette(const IntegratorParams& params);
     /// Limits of walks: sub-paths end at the last vertex that can be part of a path of max_depth edges.
     WalkOptions walk() const {
         return {max_depth == kUnlimited ? kUnlimited : max_depth + 1, rr_depth, has_roulette};

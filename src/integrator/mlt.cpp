@@ -18,8 +18,7 @@ namespace {
 class MltIntegrator final : public MarkovIntegrator {
 public:
     explicit MltIntegrator(const IntegratorParams& p)
-        : MarkovIntegrator(p, DepthOptions::without_roulette(p), {.correlation = 10, .cost = 1.25},
-                           Guiding(p)),
+        : MarkovIntegrator(p, DepthOptions::from(p), {.correlation = 10, .cost = 1.25}, Guiding(p)),
           user_paths_(p.string("user_paths")),
           user_ratio_(double(p.number("user_ratio", 0.01f, 100.0f))) {
         if (!user_paths_.empty() && p.string("guide") != "off")

@@ -110,8 +110,7 @@ private:
 class MmltIntegrator final : public MarkovIntegrator {
 public:
     explicit MmltIntegrator(const IntegratorParams& p)
-        : MarkovIntegrator(p, DepthOptions::without_roulette(p), {.correlation = 15, .cost = 1.25},
-                           Guiding(p)),
+        : MarkovIntegrator(p, DepthOptions::from(p), {.correlation = 15, .cost = 1.25}, Guiding(p)),
           lengths_(p.integer("lengths", 1, 64)) {}
 
 protected:

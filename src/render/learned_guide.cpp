@@ -44,24 +44,15 @@ IntegratorParams guided_params(IntegratorSpec& spec) {
     return {spec, integrator_entry(spec.name).info};
 }
 
-/// Limits of the walks by which a method trains its guide.
-DepthOptions depth_of_training(const IntegratorParams& params, const Integrator& integrator) {
-    const std::vector<ParamInfo>& known = integrator_entry(params.integrator()).info.params;
-    const bool has_roulette = std::any_of(known.begin(), known.end(), [](const ParamInfo& p) {
-        return std::string_view(p.name) == "rr_depth";
-    });
-    const DepthOptions depth =
-        has_roulette ? DepthOptions::from(params) : DepthOptions::without_roulette(params);
-    const bool is_chain = integrator.error_groups() > 0;
-    return is_chain ? MarkovIntegrator::pilot_depth(depth) : depth;
-}
-
 Guiding train(const Scene& scene, IntegratorSpec& spec, uint64_t seed, int threads) {
     const GuidedWalks walks = guided_walks(spec.name);
     const IntegratorParams params = guided_params(spec);
     Guiding guiding(params);
     const std::unique_ptr<Integrator> integrator = make_integrator(spec);
-    const DepthOptions depth = depth_of_training(params, *integrator);
+    // As in MarkovIntegrator.
+    const bool is_chain = integrator->error_groups() > 0;
+    const DepthOptions of_method = DepthOptions::from(params),
+                       depth = is_chain ? MarkovIntegrator::pilot_depth(of_method) : of_method;
     const Film film(scene.film(), scene.filter());
     ThreadArena arena(threads);
     const auto for_each = [&](uint64_t count, const PassContext::Task& task) {

@@ -21,6 +21,23 @@ TEST(IntegratorParams, NumbersAreFinite) {
     EXPECT_EQ(error_of_spec("vcm:radius=0.1"), "");
 }
 
+/// Methods without the parameter rr_depth have no roulette.
+TEST(IntegratorParams, DepthsAreThoseOfTheMethod) {
+    const auto depth = [](const char* spec) {
+        const IntegratorSpec s = IntegratorSpec::parse(spec);
+        return DepthOptions::from(IntegratorParams(s, integrator_entry(s.name).info));
+    };
+    for (const char* spec : {"mmlt:max_depth=7", "mlt:max_depth=7"}) {
+        EXPECT_EQ(depth(spec).max_depth, 7);
+        EXPECT_EQ(depth(spec).rr_depth, DepthOptions::kUnlimited);
+        EXPECT_FALSE(depth(spec).has_roulette);
+        EXPECT_FALSE(depth(spec).walk().has_roulette);
+    }
+    EXPECT_EQ(depth("pssmlt:rr_depth=4").rr_depth, 4);
+    EXPECT_TRUE(depth("pssmlt").walk().has_roulette);
+    EXPECT_EQ(depth("path").max_depth, DepthOptions::kUnlimited);
+}
+
 TEST(IntegratorParams, RouletteMustEndWalks) {
     for (const char* name : {"path", "light", "bdpt", "upg", "pcbpt"}) {
         const std::string spec = std::string(name) + ":rr_depth=1000000";
