@@ -136,7 +136,9 @@ void record_eye_walk(const SubPath& z, Block& block) {
 /// The contributions of a light walk and an eye walk to the image, by the number of their vertices that take part.
 struct Contributions {
     using Sums = std::array<float, kMostVertices + 3>;
-    Sums by_light{}, by_eye{}, hits{};  ///< Hits are a part of by_eye.
+    Sums by_light{}, by_eye{};
+    Sums hits{};    ///< A part of by_eye.
+    Sums direct{};  ///< The same: of light that comes from emitters to the last of these vertices.
 
     /// From these numbers of vertices on.
     static void accumulate(Sums& sums) {
@@ -147,23 +149,30 @@ struct Contributions {
 /// Joins both walks as bidirectional path tracing does, as far as the counts have its techniques; each eye vertex is
 /// connected to one vertex of the light walk, which stands for all. Splats are divided by the number of light paths. So many
 /// eye walks share each light walk.
-Contributions join_walks(const WalkContext& walk, int max_depth, float eye_walks, Sampler& sampler,
-                         const SubPath& y, const SubPath& z) {
+Contributions join_walks(const WalkContext& walk, GuidedLight light, int max_depth, float eye_walks,
+                         Sampler& sampler, const SubPath& y, const SubPath& z) {
     const TechniqueCounts& n = walk.counts;
     Contributions all;
+    const int shortest = light == GuidedLight::Indirect ? 3 : 1;  // in edges
     const auto value = [&](const Join& j) {
+        if (j.technique.vertices() - 1 < shortest) return 0.0f;
         const float weighted = luminance(j.contribution) * j.mis_weight;
         return weighted > 0 ? weighted * visibility(walk.scene, j, walk.stats) : 0.0f;
     };
     for (int t = 2; n.hit > 0 && t <= z.size(); ++t) {
         for_each_hit(walk.scene, z, t, n, [&](const Join& j) {
+            if (t - 1 < shortest) return;
             const float v = luminance(j.contribution) * j.mis_weight;
             all.by_eye[size_t(t)] += v;
             all.hits[size_t(t)] += v;
+            all.direct[size_t(t) - 1] += v;
         });
         if (t > max_depth || !z[t - 1].is_connectible) continue;
-        if (const auto j = join_next_event(walk.scene, z, t, sampler, n))
-            all.by_eye[size_t(t)] += value(*j);
+        if (const auto j = join_next_event(walk.scene, z, t, sampler, n)) {
+            const float v = value(*j);
+            all.by_eye[size_t(t)] += v;
+            all.direct[size_t(t)] += v;
+        }
         const int choices = std::min(y.size(), max_depth - t + 1) - 1;
         if (n.connect == 0 || choices < 1) continue;
         sampler.seek(Stream::Selection, uint64_t(t));
@@ -182,15 +191,25 @@ Contributions join_walks(const WalkContext& walk, int max_depth, float eye_walks
     return all;
 }
 
-/// Records what the walk contributed from its vertices on. Not of the later half, which the limit of its length cuts short.
+/// What is not expected at a vertex of an eye walk. The expectation is that at z_1, since roulette compares with it: hits of
+/// the vertex itself are over, and without direct light, none of what emitters send straight to it counts.
+Contributions::Sums left_out_at_vertices(const Contributions& c, GuidedLight light) {
+    Contributions::Sums sums = c.hits;
+    if (light == GuidedLight::Indirect)
+        for (size_t i = 0; i < sums.size(); ++i) sums[i] += c.direct[i];
+    return sums;
+}
+
+/// Records what the walk contributed from its vertices on, at a vertex without `left_out`. Not of the later half, which the
+/// limit of its length cuts short.
 void record_contributions(const SubPath& path, TransportMode mode, int max_vertices,
-                          const Contributions::Sums& sums, const Contributions::Sums& hits,
+                          const Contributions::Sums& sums, const Contributions::Sums& left_out,
                           std::vector<ContributionRecord>& records) {
     for (int i = 1; i < std::min(path.size(), std::max(2, max_vertices / 2)); ++i) {
         const Vertex& v = path[i];
         if (!v.is_connectible || v.kind != Vertex::Kind::Surface) continue;
         const auto vertices = size_t(i + 1);
-        records.push_back({v.p, luminance(v.beta), sums[vertices] - hits[vertices],
+        records.push_back({v.p, luminance(v.beta), sums[vertices] - left_out[vertices],
                            sums[vertices + 1], uint8_t(mode),
                            uint8_t(cube_face(facing_normal(v)))});
     }
@@ -368,7 +387,8 @@ bool Guiding::gains_nothing(const Guide& guide, GuidedWalks walks) const {
                     guide.surfaces.gain(TransportMode::Importance)) < kLeastGain;
 }
 
-void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWalks walks) {
+void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWalks walks,
+                    GuidedLight light) {
     constexpr int kRounds = 4;  // Each has twice the walks of the last.
     constexpr uint64_t kFirstPart = (1 << kRounds) - 1;
     const auto passes = uint32_t(pass.film.passes());
@@ -388,13 +408,13 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
         for (int round = 0; round < kRounds; ++round) {
             if (next) next->make_teacher();
             next =
-                trained(pass, depth, walks, next.get(), (walks_ / kFirstPart) << round,
+                trained(pass, depth, walks, light, next.get(), (walks_ / kFirstPart) << round,
                         hash_combine(seed, uint64_t(round)), has_roulette_ && round == kRounds - 1);
         }
     } else {
         Guide teacher = *guide_;
         teacher.make_teacher();
-        next = trained(pass, depth, walks, &teacher, walks_, seed, has_roulette_);
+        next = trained(pass, depth, walks, light, &teacher, walks_, seed, has_roulette_);
     }
     is_given_up_ = passes == 0 && mode_ == Mode::Auto && gains_little(*next, walks);
     if (is_given_up_) next = nullptr;
@@ -408,8 +428,8 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
 }
 
 std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOptions& depth,
-                                        GuidedWalks guided, const Guide* teacher, uint64_t walks,
-                                        uint64_t seed, bool for_roulette) const {
+                                        GuidedWalks guided, GuidedLight light, const Guide* teacher,
+                                        uint64_t walks, uint64_t seed, bool for_roulette) const {
     TechniqueCounts counts =
         for_roulette ? joins_of(guided, pass.light_paths) : joins_of(GuidedWalks::Both, 1);
     counts.guide = teacher;
@@ -429,13 +449,13 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
             record_eye_walk(work.z, blocks[b]);
             if (!for_roulette) continue;
             const Contributions c =
-                join_walks(walk, depth.max_depth, eye_walks, sampler, work.y, work.z);
+                join_walks(walk, light, depth.max_depth, eye_walks, sampler, work.y, work.z);
             // As in the records, one value that is not finite would be all that is learned.
             if (c.by_light[0] < kInf) blocks[b].light_contribution += double(c.by_light[0]);
             record_contributions(work.y, TransportMode::Importance, options.max_vertices,
                                  c.by_light, {}, blocks[b].contributions);
             record_contributions(work.z, TransportMode::Radiance, options.max_vertices, c.by_eye,
-                                 c.hits, blocks[b].contributions);
+                                 left_out_at_vertices(c, light), blocks[b].contributions);
         }
     });
     Block all;

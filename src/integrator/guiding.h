@@ -11,6 +11,9 @@ namespace etendue {
 /// Walks that a method guides. With pairs, each eye path meets the light paths of all pixels.
 enum class GuidedWalks { Eye, Light, Both, BothWithPairs };
 
+/// Light that guided walks bring. Other samples may make the paths of one and two edges.
+enum class GuidedLight : bool { All, Indirect };
+
 enum class GuideRefits : bool { Never, BetweenPasses };
 
 class Guiding {
@@ -23,8 +26,10 @@ public:
     bool is_on() const { return mode_ != Mode::Off; }
     /// Trains before pass 0, and refits where the image has had 8, 64, 512 … times as many samples of pixels as walks, from
     /// walks of its own: light walks show eye walks where radiance comes from, and eye walks show light walks where
-    /// importance does. Each round is guided by the one before. For Integrator::prepare().
-    void train(const PassContext& pass, const DepthOptions& depth, GuidedWalks walks);
+    /// importance does. Each round is guided by the one before. For Integrator::prepare(); chains call it once, before
+    /// anything that it guides. `light`: what guided walks contribute, by which Russian roulette ends them.
+    void train(const PassContext& pass, const DepthOptions& depth, GuidedWalks walks,
+               GuidedLight light = GuidedLight::All);
     /// What guides walks until the next call of train(); nullptr where nothing does.
     const Guide* guide() const { return guide_.get(); }
     /// Whether a guide gains so little that `auto` does without it.
@@ -41,8 +46,8 @@ private:
     /// `teacher` guides the walks that train; `for_roulette`: whether they are joined, so that their contributions can be
     /// learned.
     std::unique_ptr<Guide> trained(const PassContext& pass, const DepthOptions& depth,
-                                   GuidedWalks guided, const Guide* teacher, uint64_t walks,
-                                   uint64_t seed, bool for_roulette) const;
+                                   GuidedWalks guided, GuidedLight light, const Guide* teacher,
+                                   uint64_t walks, uint64_t seed, bool for_roulette) const;
 
     /// Whether walks are better off without guided directions at surfaces.
     bool gains_nothing(const Guide& guide, GuidedWalks walks) const;

@@ -96,7 +96,7 @@ void MarkovIntegrator::trace(const PassContext& pass) {
     const bool is_loaded = !loaded_.empty();
     if (!has_begun_) {
         if (!is_loaded) {
-            guiding_.train(pass, pilot_paths_.depth(), GuidedWalks::Both);
+            guiding_.train(pass, pilot_paths_.depth(), GuidedWalks::Both, GuidedLight::Indirect);
             const TechniqueCounts n = direct_counts(pass.scene, pass.light_paths);
             pilot_ = run_pilot(pass, bidirectional_sample(pass.scene, pilot_paths_),
                                [&](int, const SampleContext& c, Workspace& work) {

@@ -53,6 +53,7 @@ Guiding train(const Scene& scene, IntegratorSpec& spec, uint64_t seed, int threa
     const bool is_chain = integrator->error_groups() > 0;
     const DepthOptions of_method = DepthOptions::from(params),
                        depth = is_chain ? MarkovIntegrator::pilot_depth(of_method) : of_method;
+    const GuidedLight light = is_chain ? GuidedLight::Indirect : GuidedLight::All;
     const Film film(scene.film(), scene.filter());
     ThreadArena arena(threads);
     const auto for_each = [&](uint64_t count, const PassContext::Task& task) {
@@ -73,7 +74,7 @@ Guiding train(const Scene& scene, IntegratorSpec& spec, uint64_t seed, int threa
                        .chunks = {},
                        .for_each_other_path = for_each,
                        .for_each_chain = {}},
-                      depth, walks);
+                      depth, walks, light);
     });
     if (!guiding.guide() || guiding.guide()->surfaces.is_empty())
         throw NothingToLearn(

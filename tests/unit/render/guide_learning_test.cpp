@@ -9,6 +9,7 @@
 #include "random_guide.h"
 #include "render/learned_guide.h"
 #include "render/renderer.h"
+#include "render_tiles.h"
 #include "test_scenes.h"
 
 namespace etendue {
@@ -170,6 +171,53 @@ TEST(LearnedContributions, AreThoseOfTheLightPathsOfAPass) {
                 quarter = learn(scene, "bdpt:light_paths=1024").guide().light_contribution;
     EXPECT_GT(quarter, 1.5f * all);
     EXPECT_LT(quarter, 4 * all);
+}
+
+/// Chains make no direct light. Roulette of their eye walks compares what may come with the light that they make at z_1.
+TEST(LearnedContributions, OfChainsAreWithoutDirectLight) {
+    const std::string dark = test::diffuse("0.25,0.25,0.25");
+    const Scene scene =
+        test::build(test::front_camera(kSize) + test::area_lamp() +
+                    test::rectangle("<rotate x=\"1\" angle=\"-90\"/><translate y=\"-1\"/>", dark) +
+                    test::rectangle("<translate z=\"-1\"/>", dark) +
+                    test::rectangle("<rotate y=\"1\" angle=\"90\"/><translate x=\"-1\"/>", dark));
+    const Film film(scene.film(), scene.filter());
+    // Of the mean of a pixel, by what is expected at z_1.
+    const auto expected = [&](const std::string& method) {
+        const LearnedGuide learned = learn(scene, method);
+        const TechniqueCounts counts;
+        RenderStats stats;
+        const WalkContext walk{scene, counts, stats, {2, 2}};
+        SubPath z;
+        double sum = 0;
+        const uint64_t pixels = scene.film().pixel_count();
+        for (uint64_t i = 0; i < pixels; ++i) {
+            Sampler sampler(SamplerKind::Independent, 3);
+            sampler.start(0, i);
+            trace_eye_path(walk, film, i, sampler, z);
+            if (z.size() < 2) continue;
+            const WalkContribution c = expected_contribution(
+                z[1], learned.guide().surfaces.cell(z[1].p), TransportMode::Radiance);
+            sum += double(luminance(z[1].beta) * std::max(0.0f, c.here)) / double(pixels);
+        }
+        return sum;
+    };
+    const auto rendered = [&](int shortest) {
+        const test::Tiles image =
+            test::render_tiles(scene, "bdpt", {.passes = 32, .tiles = 1, .shortest = shortest});
+        return double(luminance(Rgb(float(image.values[0].mean()), float(image.values[1].mean()),
+                                    float(image.values[2].mean()))));
+    };
+    const double all = rendered(2), indirect = rendered(3);
+    ASSERT_LT(indirect, 0.2 * all);
+    // Light walks splat the rest of either.
+    const double with_direct = expected("bdpt"), without = expected("pssmlt");
+    EXPECT_GT(with_direct, 0.3 * all);
+    EXPECT_GT(without, 0.3 * indirect);
+    EXPECT_LT(without, indirect);
+    // Light walks, too, have what chains splat.
+    EXPECT_LT(learn(scene, "pssmlt").guide().light_contribution,
+              0.8f * learn(scene, "bdpt").guide().light_contribution);
 }
 
 /// What is shown of a guide is what a rendering learns before its first pass.
