@@ -38,6 +38,15 @@ TEST(IntegratorParams, DepthsAreThoseOfTheMethod) {
     EXPECT_EQ(depth("path").max_depth, DepthOptions::kUnlimited);
 }
 
+/// No samples are made that a guide could lead.
+TEST(IntegratorParams, UserPathsAndAGuideExcludeEachOther) {
+    for (const char* guide : {"on", "auto"})
+        EXPECT_EQ(error_of_spec(std::string("mlt:user_paths=a.json,guide=") + guide),
+                  "mlt: with user_paths no samples are made that a guide could lead; leave out "
+                  "user_paths or guide");
+    EXPECT_EQ(error_of_spec("mlt:user_paths=a.json,guide=off"), "");
+}
+
 TEST(IntegratorParams, RouletteMustEndWalks) {
     for (const char* name : {"path", "light", "bdpt", "upg", "pcbpt"}) {
         const std::string spec = std::string(name) + ":rr_depth=1000000";
