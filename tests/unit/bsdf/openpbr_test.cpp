@@ -86,7 +86,9 @@ std::vector<Named> all_lobes() {
             {"coated glass", kColors + kGlass + rough(0.5) + layers},
             {"cloth", kColors + kFuzz},
             {"opaque below all", kColors + rough(0.6) + layers},
-            {"metal below all", kColors + kMetal + layers}};
+            {"metal below all", kColors + kMetal + layers},
+            {"half metal", kColors + rough(0.4) + Values{{"base_metalness", 0.5}}},
+            {"half metal below all", kColors + layers + Values{{"base_metalness", 0.5}}}};
 }
 
 TEST(OpenPbr, SamplesMatchPdf) {
@@ -136,7 +138,7 @@ TEST(OpenPbr, SmoothPartsAreDeltaEvents) {
 
 /// ∫ f of the smooth part and of the delta events; of sharp lobes beside wide ones the mean of samples.
 double albedo(const OpenPbrLobe& lobe, Vec3 wo, int channel = 1) {
-    if (lobe.has_smooth() && lobe.roughness() < 0.03f && lobe.slab != OpenPbrSlab::Glass)
+    if (lobe.has_smooth() && lobe.roughness() < 0.03f && !lobe.is_glass())
         return double(sampled_albedo(lobe, wo, 512).value[channel]);
     double sum = lobe.has_smooth() ? integrated_albedo(lobe, wo, channel) : 0;
     for (const bool transmits : {false, true})
@@ -160,7 +162,7 @@ TEST_P(OpenPbrFurnace, IsClosedForWhiteSurfaces) {
         Made made(kWhite + values + rough(r));
         const OpenPbrLobe lobe = made.lobe();
         for (const float cos : {1.0f, 0.8f, 0.5f, 0.2f, 0.1f, -0.1f, -0.3f, -0.7f, -1.0f}) {
-            if (cos < 0 && lobe.slab != OpenPbrSlab::Glass) continue;
+            if (cos < 0 && !lobe.is_glass()) continue;
             const double a = albedo(lobe, {std::sqrt(1 - sqr(cos)), 0, cos});
             EXPECT_LE(a, 1 + above) << "roughness " << r << ", cosine " << cos;
             EXPECT_GE(a, 1 - below) << "roughness " << r << ", cosine " << cos;
@@ -182,8 +184,17 @@ INSTANTIATE_TEST_SUITE_P(
                       Furnace{"FuzzyMetal", kMetal + kFuzz}, Furnace{"FuzzyOpaque", kFuzz},
                       Furnace{"FuzzyGlass", kGlass + kFuzz}, Furnace{"BrushedOpaque", kBrushed},
                       Furnace{"BrushedGlass", kGlass + kBrushed},
-                      // The fuzz is taken to be over the slab alone.
-                      Furnace{"All", kCoat + kFuzz, 0.006, 0.015}),
+                      Furnace{"All", kCoat + kFuzz, 0.003, 0.003},
+                      Furnace{"AllOverMetal", kMetal + kCoat + kFuzz, 0.003, 0.003},
+                      Furnace{"AllOverGlass", kGlass + kCoat + kFuzz, 0.003, 0.003},
+                      Furnace{"FuzzOverASmoothCoat", kSmoothCoat + kFuzz, 0.003, 0.003},
+                      Furnace{"PartOfAll",
+                              Values{{"coat_weight", 0.4},
+                                     {"coat_roughness", 0.3},
+                                     {"fuzz_weight", 0.6},
+                                     {"fuzz_roughness", 0.3},
+                                     {"base_metalness", 0.3}},
+                              0.003, 0.003}),
     [](const auto& tested) { return tested.param.name; });
 
 TEST(OpenPbr, AnisotropicMetalIsClosed) {
@@ -218,6 +229,77 @@ TEST(OpenPbr, TexturedRoughnessAndReflectanceAreClosed) {
     }
 }
 
+/// Textures of one value each, which may change.
+struct Textured {
+    const char* name;
+    Rgb value;
+};
+std::function<Children(TestMaterials&)> textures(std::vector<Textured>& all) {
+    return [&all](TestMaterials& m) {
+        Children children;
+        for (Textured& t : all) {
+            FunctionTexture texture;
+            texture.color = [&t](Vec2) { return t.value; };
+            children.push_back({t.name, m.texture(texture)});
+        }
+        return children;
+    };
+}
+
+TEST(OpenPbr, TexturedRoughnessOfLayersIsClosed) {
+    for (const Values& slab : {kMetal, Values{}, kGlass})
+        for (const bool both : {false, true}) {
+            std::vector<Textured> all{{"coat_roughness", Rgb(0)}, {"fuzz_roughness", Rgb(0)}};
+            if (!both) all.pop_back();
+            Made made(kWhite + slab + rough(0.3) +
+                          Values{{"coat_weight", 1.0}, {"fuzz_weight", both ? 1.0 : 0.0}},
+                      textures(all));
+            for (const auto& [coat, fuzz] :
+                 {std::pair{0.07f, 0.15f}, {0.33f, 0.4f}, {0.8f, 0.9f}}) {
+                all[0].value = Rgb(coat);
+                if (both) all[1].value = Rgb(fuzz);
+                const OpenPbrLobe lobe = made.lobe();
+                for (const float cos : {1.0f, 0.6f, 0.2f, 0.1f, -0.2f, -0.8f}) {
+                    if (cos < 0 && !lobe.is_glass()) continue;
+                    EXPECT_NEAR(albedo(lobe, {std::sqrt(1 - sqr(cos)), 0, cos}), 1, 0.01)
+                        << "coat " << coat << ", fuzz " << fuzz << ", cosine " << cos;
+                }
+            }
+        }
+}
+
+// Every parameter of the layers takes a texture. Tables between whose rows is interpolated are within 2 %.
+TEST(OpenPbr, TexturesOfLayersAreLikeNumbers) {
+    const Values base = kColors + rough(0.5) +
+                        Values{{"coat_weight", 0.9}, {"fuzz_weight", 0.8}, {"base_metalness", 0.2}};
+    const double significance = sidak(1e-3, 10);
+    for (const auto& [name, value, tolerance] :
+         {std::tuple("coat_color", Rgb(0.9f, 0.6f, 0.3f), 1e-4),
+          {"coat_roughness", Rgb(0.37f), 0.02},
+          {"fuzz_color", Rgb(0.3f, 0.9f, 0.6f), 1e-4},
+          {"fuzz_roughness", Rgb(0.43f), 0.02},
+          {"base_diffuse_roughness", Rgb(0.6f), 1e-4}}) {
+        const bool is_color = value.r != value.g;
+        std::vector<Textured> texture{{name, value}};
+        Made textured(base, textures(texture)),
+            constant(base + Values{{name, is_color ? ParamValue(value) : double(value.r)}}),
+            without(base);
+        double most = 0;
+        for (const Vec3 wo : test_directions())
+            for (const Vec3 wi : test_directions()) {
+                const Rgb a = textured.lobe().eval(wo, wi).f, b = constant.lobe().eval(wo, wi).f;
+                EXPECT_TRUE(nearly(a, b, tolerance, 1e-6))
+                    << name << describe(wo) << describe(wi) << a.g << " " << b.g;
+                most = std::max(most, double(std::fabs(b.b - without.lobe().eval(wo, wi).f.b)));
+            }
+        EXPECT_GT(most, 1e-3) << name;
+        for (const Vec3 wo : {direction(20, 0), direction(75, 50)})
+            expect_samples_match_pdf(textured.lobe(), wo, significance, 30000);
+        expect_adjoint_symmetry(textured.lobe(), direction(50, 10));
+        expect_finite(textured.lobe());
+    }
+}
+
 // Nearer to the horizon, albedos change faster with the roughness than between rows.
 TEST(OpenPbr, TexturedRoughnessIsNearlyClosedAtTheHorizon) {
     float r = 0;
@@ -245,7 +327,7 @@ TEST(OpenPbr, SmoothFacetsScatterNothingButDeltaEvents) {
         const OpenPbrLobe lobe = made.lobe();
         ASSERT_FALSE(lobe.has_smooth());
         for (const float cos : {1.0f, 0.1f, 0.01f, 0.001f, -0.01f}) {
-            if (cos < 0 && lobe.slab != OpenPbrSlab::Glass) continue;
+            if (cos < 0 && !lobe.is_glass()) continue;
             const Vec3 wo{std::sqrt(1 - sqr(cos)), 0, cos};
             double sum = 0;
             for (const bool transmits : {false, true})
@@ -270,7 +352,7 @@ TEST(OpenPbr, ACoatRoughensWhatLiesBelowByItsWeight) {
                     std::pow(std::min(1.0, std::pow(base, 4) + 2 * std::pow(coat, 4)), 0.25);
                 Made made(kMetal + rough(base) +
                           Values{{"coat_weight", weight}, {"coat_roughness", coat}});
-                EXPECT_NEAR(std::sqrt(double(made.lobe().alpha_x)), base + weight * (below - base),
+                EXPECT_NEAR(double(made.lobe().surface_roughness), base + weight * (below - base),
                             1e-5)
                     << base << " " << coat << " " << weight;
             }
@@ -466,18 +548,20 @@ TEST(OpenPbr, MaterialReadsItsParameters) {
                                                     {"coat_ior", 0.9},
                                                     {"specular_ior", 0.0},
                                                     {"fuzz_roughness", 2.0},
+                                                    {"coat_color", Rgb(0.5f, 1.1f, 1)},
+                                                    {"fuzz_color", Rgb(1.1f)},
                                                     {"specular_roughness_anisotropy", -0.1}})
         EXPECT_THROW(Made(Values{{"coat_weight", 1.0}, {"fuzz_weight", 1.0}, wrong}), SceneError)
             << wrong.name;
-    // Two components, with their shares.
+    // Metal and dielectric are one component, glass is another one.
     const Bsdf both = Made(kMetal + rough(0.5)).bsdf();
     EXPECT_EQ(both.front().weight, 1);
     Made mixed(Values{{"base_metalness", 0.25}, {"transmission_weight", 0.4}});
-    const Bsdf three = mixed.bsdf();
+    const Bsdf two = mixed.bsdf();
     float sum = 0;
     int count = 0;
-    for (const BsdfComponent* c = &three.front(); c; c = c->next) sum += c->weight, ++count;
-    EXPECT_EQ(count, 3);
+    for (const BsdfComponent* c = &two.front(); c; c = c->next) sum += c->weight, ++count;
+    EXPECT_EQ(count, 2);
     EXPECT_FLOAT_EQ(sum, 1);
     Made thin(kGlass + Values{{"thin_walled", true}, {"transmission_color", Rgb(0.5f)}});
     const Bsdf pane = thin.bsdf();
