@@ -9,7 +9,7 @@ from typing import Any
 from .albedos import mean_reflectance
 from .nodes import Output
 from .surfaces import Surface, reflecting, rough, weighted_sum, with_normal
-from .values import Color, Value, Values, as_color, bounded, is_texture, parameter, product
+from .values import Value, Values, bounded, is_texture, parameter, product
 
 _LEFT_OUT = ("Subsurface Weight", "Thin Film Thickness", "Anisotropic Rotation")
 
@@ -32,7 +32,7 @@ def principled(node: Output, values: Values) -> Surface:
         **_sheen(node, values),
     }
     if node.has("Diffuse Roughness"):
-        bsdf["base_diffuse_roughness"] = bounded(values.constant(node.input("Diffuse Roughness"), node))
+        bsdf["base_diffuse_roughness"] = bounded(values.number(node.input("Diffuse Roughness")))
     # The level is a factor of the reflectance along the normal, except of glass.
     if glass != 1.0:
         bsdf["specular_weight"] = product(values.number(node.input("Specular IOR Level")), 2.0)
@@ -61,21 +61,13 @@ def _facets(node: Output, values: Values) -> dict[str, Any]:
     return {"specular_roughness": bounded(wider), "specular_roughness_anisotropy": 1 - ratio}
 
 
-def _constant_color(name: str, node: Output, values: Values) -> Color:
-    value = values.color(node.input(name))
-    if is_texture(value):
-        values.warn(node, f"{name} cannot be a texture")
-        value = as_color(node.input(name).value)
-    return bounded(as_color(value))
-
-
 def _coat(node: Output, values: Values, weight: Value) -> dict[str, Any]:
     if weight == 0.0:
         return {}
     return {
         "coat_weight": bounded(weight),
-        "coat_color": parameter(_constant_color("Coat Tint", node, values)),
-        "coat_roughness": bounded(values.constant(node.input("Coat Roughness"), node)),
+        "coat_color": parameter(bounded(values.color(node.input("Coat Tint")))),
+        "coat_roughness": bounded(values.number(node.input("Coat Roughness"))),
         "coat_ior": max(values.constant(node.input("Coat IOR"), node), 1.0),
     }
 
@@ -86,15 +78,15 @@ def _sheen(node: Output, values: Values) -> dict[str, Any]:
         return {}
     return {
         "fuzz_weight": bounded(weight),
-        "fuzz_color": parameter(_constant_color("Sheen Tint", node, values)),
-        "fuzz_roughness": bounded(values.constant(node.input("Sheen Roughness"), node)),
+        "fuzz_color": parameter(bounded(values.color(node.input("Sheen Tint")))),
+        "fuzz_roughness": bounded(values.number(node.input("Sheen Roughness"))),
     }
 
 
 def _below_a_coat(node: Output, values: Values, base: Surface) -> Surface:
     """A clear coat with other normals: its reflection is added, and the base loses the mean reflectance of the coat."""
     weight = min(values.constant(node.input("Coat Weight"), node), 1.0)
-    if _constant_color("Coat Tint", node, values) != (1.0, 1.0, 1.0):
+    if values.color(node.input("Coat Tint")) != (1.0, 1.0, 1.0):
         values.warn(node, "Coat Tint has no effect beside a linked normal")
     ior, roughness = values.constant(node.input("Coat IOR"), node), values.number(node.input("Coat Roughness"))
     facets = rough(roughness, node, values)

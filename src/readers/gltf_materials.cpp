@@ -129,21 +129,32 @@ void GltfReader::read_surface(const JsonValue& m, int surface, VertexColors colo
     if (const JsonValue coat = extension(m, "KHR_materials_clearcoat")) {
         set_scalar(surface, "coat_weight", coat["clearcoatFactor"].number(0, 0, 1),
                    coat["clearcoatTexture"], "r");
-        set(surface, "coat_roughness", coat["clearcoatRoughnessFactor"].number(0, 0, 1));
+        set_scalar(surface, "coat_roughness", coat["clearcoatRoughnessFactor"].number(0, 0, 1),
+                   coat["clearcoatRoughnessTexture"], "g");
         set(surface, "coat_ior", 1.5);
-        for (const char* name : {"clearcoatRoughnessTexture", "clearcoatNormalTexture"})
-            if (coat[name]) warn(fmt::format("{}: has no effect", coat[name].path()));
-    }
-    if (const JsonValue cloth = extension(m, "KHR_materials_sheen")) {
-        const Rgb c = clamped(colour(cloth["sheenColorFactor"], Rgb(0)));
-        const JsonValue colors_of_cloth = cloth["sheenColorTexture"];
-        set_scalar(surface, "fuzz_weight", double(c.max()), colors_of_cloth, "all", false);
-        if (colors_of_cloth) warn(fmt::format("{}: the hue has no effect", colors_of_cloth.path()));
-        if (c.max() > 0) set(surface, "fuzz_color", c / c.max());
-        set(surface, "fuzz_roughness", cloth["sheenRoughnessFactor"].number(0, 0, 1));
-        if (const JsonValue t = cloth["sheenRoughnessTexture"])
+        if (const JsonValue t = coat["clearcoatNormalTexture"])
             warn(fmt::format("{}: has no effect", t.path()));
     }
+    if (const JsonValue cloth = extension(m, "KHR_materials_sheen")) read_sheen(cloth, surface);
+}
+
+/// The weight of the fuzz is the largest component of the sheen's colour.
+void GltfReader::read_sheen(const JsonValue& cloth, int surface) {
+    const Rgb c = clamped(colour(cloth["sheenColorFactor"], Rgb(0)));
+    const int texture = c.max() > 0 ? bitmap(cloth["sheenColorTexture"], false) : -1;
+    if (texture >= 0) {
+        for (const char* output : {"fuzz_weight", "fuzz_color"}) {
+            const int part = add("texture", "sheen_to_fuzz", cloth);
+            set(part, "output", std::string(output));
+            set_color(part, "color", {c, texture});
+            add_child(surface, output, part);
+        }
+    } else {
+        set(surface, "fuzz_weight", double(c.max()));
+        if (c.max() > 0) set(surface, "fuzz_color", c / c.max());
+    }
+    set_scalar(surface, "fuzz_roughness", cloth["sheenRoughnessFactor"].number(0, 0, 1),
+               cloth["sheenRoughnessTexture"], "opacity");
 }
 
 /// The roughness α along the bitangent, and α + (1 − α) strength² along the tangent, by their ratio and their mean square. The ratio is

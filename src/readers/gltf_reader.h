@@ -67,6 +67,7 @@ private:
     const Material& material(size_t index, VertexColors colors);
     Material read_material(const JsonValue& m, VertexColors colors);
     void read_surface(const JsonValue& m, int surface, VertexColors colors);
+    void read_sheen(const JsonValue& cloth, int surface);
     void read_anisotropy(const JsonValue& brushed, int surface, double roughness,
                          const JsonValue& texture);
     int vertex_attribute(const char* name);

@@ -14,6 +14,7 @@ TextureEntry mesh_attribute_entry();
 TextureEntry roughness_to_alpha_entry();
 TextureEntry threshold_entry();
 TextureEntry specular_to_metallic_entry();
+TextureEntry sheen_to_fuzz_entry();
 TextureEntry dots_entry();
 TextureEntry checkerboard3d_entry();
 TextureEntry fbm_entry();
@@ -49,6 +50,7 @@ const std::vector<TextureEntry>& texture_registry() {
                                                       roughness_to_alpha_entry(),
                                                       threshold_entry(),
                                                       specular_to_metallic_entry(),
+                                                      sheen_to_fuzz_entry(),
                                                       dots_entry(),
                                                       checkerboard3d_entry(),
                                                       fbm_entry(),

@@ -91,6 +91,37 @@ def test_values_above_1_are_clamped(studio, kind, name):
     assert np.array_equal(*images)
 
 
+LAYERS = {
+    "Coat Tint": ((0.9, 0.4, 0.1), dict(Coat_Weight=1.0)), "Coat Roughness": (0.4, dict(Coat_Weight=1.0)),
+    "Sheen Tint": ((0.1, 0.3, 0.9), dict(Sheen_Weight=1.0)), "Sheen Roughness": (0.3, dict(Sheen_Weight=1.0)),
+    "Diffuse Roughness": (0.8, {})}
+
+
+@pytest.mark.parametrize("name", LAYERS)
+def test_textures_of_layers_are_those_of_their_texels(studio, name, capfd):
+    """An image of one colour renders as the same constant; tables of textures differ by less than 1 %."""
+    value, others = LAYERS[name]
+    material, tree, node = studio.material(PRINCIPLED, Base_Color=COLOR, Roughness=0.6, **others)
+    color = (*value, 1.0) if isinstance(value, tuple) else (value, value, value, 1.0)
+    picture = bpy.data.images.new("Texels", 2, 2, float_buffer=True)
+    picture.colorspace_settings.name = "Non-Color"
+    picture.pixels = color * 4
+    node.inputs[name].default_value = color if isinstance(value, tuple) else value
+    studio.sphere(material)
+    lit(studio, "world")
+    constant = studio.render().mean(axis=(0, 1))
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image = picture
+    tree.links.new(texture.outputs["Color"], node.inputs[name])
+    node.inputs[name].default_value = (1.0, 1.0, 1.0, 1.0) if isinstance(value, tuple) else 1.0
+    capfd.readouterr()
+    assert studio.render().mean(axis=(0, 1)) == pytest.approx(constant, rel=0.01)
+    assert "cannot be a texture" not in "".join(capfd.readouterr())
+    tree.nodes.remove(texture)
+    other = studio.render().mean(axis=(0, 1))
+    assert abs(other / constant - 1).max() > 0.01  # so the texture does have an effect
+
+
 def two_shaders(studio, mixer, second, factor=0.3):
     """A plane whose material mixes or adds a diffuse node and another one; returns the other node."""
     material, tree, node = studio.material(mixer)

@@ -292,6 +292,28 @@ def test_standard_surface(tmp_path: Path) -> None:
     assert lamp["/Quad.emitter.radiance"]["value"] == [3, 1.5, 0]
 
 
+@pytest.mark.parametrize("model, coat, cloth, rough", [
+    (STANDARD, "coat", "sheen", "diffuse_roughness"), (OPEN_PBR, "coat_weight", "fuzz_weight", "base_diffuse_roughness")])
+def test_textures_of_layers(tmp_path: Path, capfd: pytest.CaptureFixture[str], model: dict[str, str], coat: str, cloth: str,
+                            rough: str) -> None:
+    png(tmp_path / "four.png", FOUR)
+    names = [f"{layer.removesuffix('_weight')}_{end}" for layer in (coat, cloth) for end in ("color", "roughness")]
+    inputs = f"float inputs:{coat} = 1\nfloat inputs:{cloth} = 1\n" + "".join(
+        f"{'color3f' if n.endswith('color') else 'float'} inputs:{n}.connect = </Paint/Image.outputs:{'rgb' if n.endswith('color') else 'r'}>\n"
+        for n in (*names, rough))
+    p = surface(tmp_path, inputs, texture(), **model)
+    assert [p[n]["type"] for n in ("coat_color", "coat_roughness", "fuzz_color", "fuzz_roughness", "base_diffuse_roughness")] == ["bitmap"] * 5
+    assert p["coat_roughness"]["channel"] == "r" and p["coat_roughness"]["raw"] is True and "channel" not in p["coat_color"]
+    assert "no effect" not in "".join(capfd.readouterr())
+    image(load(tmp_path, CAMERA + SKY + material(inputs, texture(), **model)))
+
+
+def test_a_texture_of_the_roughness_of_a_preview_coat(tmp_path: Path) -> None:
+    png(tmp_path / "grey.png", np.array([[0, 128], [128, 255]]))
+    inputs = "float inputs:clearcoat = 1\nfloat inputs:clearcoatRoughness.connect = </Paint/Image.outputs:r>"
+    assert surface(tmp_path, inputs, texture(file="grey.png"))["coat_roughness"]["type"] == "bitmap"
+
+
 def test_open_pbr(tmp_path: Path) -> None:
     p = surface(tmp_path, "float inputs:base_metalness = 1\nfloat inputs:specular_weight = 0.5\nfloat inputs:coat_weight = 0.25",
                    **OPEN_PBR)

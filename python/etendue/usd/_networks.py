@@ -65,14 +65,6 @@ class Inputs:
             return float(self.defaults[name])
         return float(found)
 
-    def constant_color(self, name: str) -> Object:
-        """A colour; of textures, the default and a warning."""
-        found = self.color(name)
-        if found["type"] == "rgb":
-            return found
-        self.context.warn(self.shader, f"inputs:{name} must be a colour here: its texture has no effect")
-        return rgb(self.defaults[name])
-
     def token(self, name: str) -> str:
         """A text."""
         return str(self._evaluate(self.shader, name, self.defaults[name], "r", 0))

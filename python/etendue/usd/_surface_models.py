@@ -47,7 +47,7 @@ def _preview_surface(inputs: Inputs) -> Parameters:
     else:
         made.update(base_color=diffuse, base_metalness=inputs.scalar("metallic"))
     if inputs.is_changed("clearcoat"):
-        made.update(coat_weight=inputs.scalar("clearcoat"), coat_roughness=_share(inputs, "clearcoatRoughness"), coat_ior=1.5)
+        made.update(coat_weight=inputs.scalar("clearcoat"), coat_roughness=inputs.scalar("clearcoatRoughness"), coat_ior=1.5)
     opacity, threshold = inputs.scalar("opacity"), inputs.number("opacityThreshold")
     is_constant = not isinstance(opacity, dict)
     if threshold > 0:
@@ -63,7 +63,7 @@ def _share(inputs: Inputs, name: str) -> float:
 
 def _base(inputs: Inputs, factor: str, subsurface: str, metalness: str) -> Any:
     """The base colour, blended with that of subsurface scattering, which is taken for diffuse; metal has none."""
-    base, weight = bounded(product(inputs.color("base_color"), inputs.number(factor))), _share(inputs, subsurface)
+    base, weight = bounded(product(inputs.color("base_color"), inputs.scalar(factor))), _share(inputs, subsurface)
     if weight == 0 or inputs.scalar(metalness) == 1.0:
         return base
     below = bounded(inputs.color("subsurface_color"))
@@ -77,19 +77,19 @@ def _layers(inputs: Inputs, coat: str, ior: str, fuzz: str) -> Parameters:
     made: Parameters = {}
     if inputs.is_changed(coat):
         prefix = coat.removesuffix("_weight")
-        made.update(coat_weight=inputs.scalar(coat), coat_color=bounded(inputs.constant_color(f"{prefix}_color")),
-                    coat_roughness=_share(inputs, f"{prefix}_roughness"), coat_ior=max(inputs.number(ior), 1.0))
+        made.update(coat_weight=inputs.scalar(coat), coat_color=bounded(inputs.color(f"{prefix}_color")),
+                    coat_roughness=inputs.scalar(f"{prefix}_roughness"), coat_ior=max(inputs.number(ior), 1.0))
     if inputs.is_changed(fuzz):
         prefix = fuzz.removesuffix("_weight")
-        made.update(fuzz_weight=inputs.scalar(fuzz), fuzz_color=bounded(inputs.constant_color(f"{prefix}_color")),
-                    fuzz_roughness=_share(inputs, f"{prefix}_roughness"))
+        made.update(fuzz_weight=inputs.scalar(fuzz), fuzz_color=bounded(inputs.color(f"{prefix}_color")),
+                    fuzz_roughness=inputs.scalar(f"{prefix}_roughness"))
     return made
 
 
 def _standard_surface(inputs: Inputs) -> Parameters:
     return {
         "base_color": _base(inputs, "base", "subsurface", "metalness"),
-        "base_diffuse_roughness": _share(inputs, "diffuse_roughness"),
+        "base_diffuse_roughness": inputs.scalar("diffuse_roughness"),
         "base_metalness": inputs.scalar("metalness"),
         "specular_weight": inputs.scalar("specular"),
         "specular_color": inputs.color("specular_color"),
@@ -109,7 +109,7 @@ def _standard_surface(inputs: Inputs) -> Parameters:
 def _open_pbr(inputs: Inputs) -> Parameters:
     return {
         "base_color": _base(inputs, "base_weight", "subsurface_weight", "base_metalness"),
-        "base_diffuse_roughness": _share(inputs, "base_diffuse_roughness"),
+        "base_diffuse_roughness": inputs.scalar("base_diffuse_roughness"),
         "base_metalness": inputs.scalar("base_metalness"),
         "specular_weight": inputs.scalar("specular_weight", most=math.inf),
         "specular_color": inputs.color("specular_color"),

@@ -85,6 +85,14 @@ T value_of(const SceneObject& o, const char* name) {
     return *v;
 }
 
+/// The texture of a parameter.
+const SceneObject& texture_of(const SceneDescription& scene, const SceneObject& o,
+                              const char* name) {
+    for (const auto& c : o.children)
+        if (c.name == name) return scene.objects[size_t(c.object)];
+    throw std::logic_error(std::string("no texture ") + name);
+}
+
 void expect_no_warning_of_materials(const SceneDescription& scene) {
     for (const std::string& w : scene.warnings) EXPECT_EQ(w.find("/materials"), w.npos) << w;
 }
@@ -299,17 +307,43 @@ TEST(Gltf, AnisotropyKeepsItsStrengthBesideATextureOfRoughness) {
     }));
 }
 
-TEST(Gltf, SheenColoursAreNotLinear) {
+TEST(Gltf, TexturesOfSheenAndClearCoatAreRead) {
     const SceneDescription scene = with_material(
-        R"({"extensions":{"KHR_materials_sheen":{"sheenColorFactor":[0.5,0.25,0],"sheenColorTexture":{"index":0}}}})",
-        R"(,"textures":[{"source":0}],"images":[{"uri":"a.png"}])");
-    EXPECT_FALSE(find_type(scene, "bitmap").find("raw"));
-    EXPECT_FALSE(find_type(scene, "bitmap").find("channel"));
-    EXPECT_EQ(value_of<double>(find_type(scene, "scale"), "scale"), 0.5);
-    EXPECT_EQ(value_of<Rgb>(find_type(scene, "openpbr"), "fuzz_color"), Rgb(1, 0.5f, 0));
-    EXPECT_TRUE(std::any_of(scene.warnings.begin(), scene.warnings.end(), [](const auto& w) {
-        return w.find("sheenColorTexture: the hue has no effect") != w.npos;
-    }));
+        R"({"extensions":{"KHR_materials_sheen":{"sheenColorFactor":[0.5,0.25,0],"sheenColorTexture":{"index":0},
+            "sheenRoughnessFactor":0.75,"sheenRoughnessTexture":{"index":1}},
+            "KHR_materials_clearcoat":{"clearcoatFactor":1,"clearcoatRoughnessFactor":0.5,
+            "clearcoatRoughnessTexture":{"index":2}}}})",
+        R"(,"textures":[{"source":0},{"source":1},{"source":2}],
+            "images":[{"uri":"a.png"},{"uri":"b.png"},{"uri":"c.png"}])");
+    expect_no_warning_of_materials(scene);
+    const SceneObject& m = find_type(scene, "openpbr");
+    const auto image_of = [&](const SceneObject& product) {
+        return scene.objects[size_t(product.children.at(0).object)];
+    };
+    for (const char* output : {"fuzz_weight", "fuzz_color"}) {
+        const SceneObject& part = texture_of(scene, m, output);
+        EXPECT_EQ(part.type, "sheen_to_fuzz");
+        EXPECT_EQ(value_of<std::string>(part, "output"), output);
+        const SceneObject& product = texture_of(scene, part, "color");
+        EXPECT_EQ(value_of<Rgb>(product, "scale"), Rgb(0.5f, 0.25f, 0));
+        // Colours are sRGB.
+        EXPECT_FALSE(image_of(product).find("raw") || image_of(product).find("channel"));
+    }
+    for (const auto& [name, factor, file, channel] :
+         {std::tuple("fuzz_roughness", 0.75, "b.png", "opacity"),
+          {"coat_roughness", 0.5, "c.png", "g"}}) {
+        const SceneObject& product = texture_of(scene, m, name);
+        EXPECT_EQ(value_of<double>(product, "scale"), factor);
+        const SceneObject image = image_of(product);
+        EXPECT_EQ(value_of<std::string>(image, "filename"), file);
+        EXPECT_EQ(value_of<std::string>(image, "channel"), channel);
+        EXPECT_TRUE(value_of<bool>(image, "raw"));
+    }
+    // Textures of black sheen are not read.
+    const SceneDescription black =
+        with_material(R"({"extensions":{"KHR_materials_sheen":{"sheenColorTexture":{"index":0}}}})",
+                      R"(,"textures":[{"source":0}],"images":[{"uri":"a.png"}])");
+    EXPECT_EQ(value_of<double>(find_type(black, "openpbr"), "fuzz_weight"), 0);
 }
 
 TEST(Gltf, SpecularGlossinessIsReadAsWell) {
@@ -346,14 +380,6 @@ TEST(Gltf, SpecularGlossinessIsReadAsWell) {
     EXPECT_LT(m, 0.9);
     EXPECT_NEAR(0.96 * b * (1 - m), 0.4 * 0.7, 0.02);
     EXPECT_NEAR(0.04 * (1 - m) + b * m, 0.3, 0.02);
-}
-
-/// The texture of a parameter.
-const SceneObject& texture_of(const SceneDescription& scene, const SceneObject& o,
-                              const char* name) {
-    for (const auto& c : o.children)
-        if (c.name == name) return scene.objects[size_t(c.object)];
-    throw std::logic_error(std::string("no texture ") + name);
 }
 
 /// That of a product with this factor.

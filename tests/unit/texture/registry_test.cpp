@@ -253,6 +253,19 @@ TEST_F(TextureRegistry, SpecularColoursBecomeMetal) {
               1);
 }
 
+TEST_F(TextureRegistry, SheenBecomesFuzz) {
+    const auto make = [&](Rgb color, const char* output) -> const Texture& {
+        return build(object("sheen_to_fuzz", {{"color", color}, {"output", std::string(output)}}));
+    };
+    const Rgb sheen(0.2f, 0.4f, 0.1f);
+    EXPECT_EQ(make(sheen, "fuzz_weight").eval_scalar({}), 0.4f);
+    EXPECT_EQ(make(sheen, "fuzz_color").eval({}), Rgb(0.5f, 1, 0.25f));
+    EXPECT_EQ(make(sheen, "fuzz_color").mean(), Rgb(0.5f, 1, 0.25f));
+    // Without sheen, any colour will do.
+    EXPECT_EQ(make(Rgb(0), "fuzz_weight").eval_scalar({}), 0);
+    EXPECT_EQ(make(Rgb(0), "fuzz_color").eval({}), Rgb(1));
+}
+
 TEST_F(TextureRegistry, BilerpMeetsItsCorners) {
     const Texture& t = build(object("bilerp", {{"v00", Rgb(1, 0, 0)},
                                                {"v01", Rgb(0, 1, 0)},
