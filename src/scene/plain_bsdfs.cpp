@@ -75,6 +75,22 @@ bool is_zero(const SceneObject& o, std::string_view name) {
     return !has_texture(o, name) && number(o, name, 0) == 0;
 }
 
+bool is_nested_in(PlainScene& s, int index, std::string_view type) {
+    return std::any_of(
+        s.scene().objects.begin(), s.scene().objects.end(), [&](const SceneObject& o) {
+            return o.type == type && std::any_of(o.children.begin(), o.children.end(),
+                                                 [&](const auto& c) { return c.object == index; });
+        });
+}
+
+void nest_in_twosided(PlainScene& s, int index) {
+    SceneObject inner = s.object(index);
+    SceneObject both_sides{"bsdf", "twosided", inner.id, inner.where, {}, {}};
+    inner.id.clear();
+    both_sides.children = {{"", s.add(std::move(inner)), both_sides.where}};
+    s.object(index) = std::move(both_sides);
+}
+
 /// The nearest that Mitsuba 3 has: its principled model, of which energy is not conserved; a blend with a pane for thin
 /// glass.
 void replace_openpbr(PlainScene& s, int index) {
@@ -107,21 +123,28 @@ void replace_openpbr(PlainScene& s, int index) {
         if (const double a = number(o, "specular_roughness_anisotropy", 0); a > 0)
             set(o, "anisotropic", std::min(a / 0.9, 1.0));
         if (has(o, "coat_weight")) {
-            // The gloss from 0 to 1 is an α from 0.1 to 0.001.
-            const double alpha = std::pow(number(o, "coat_roughness", 0), 2);
+            // The gloss from 0 to 1 is an α from 0.1 to 0.001; textures of the roughness are taken for kTexel.
+            constexpr double kTexel = 0.2;
+            const double alpha = std::pow(
+                number(o, "coat_roughness", has_texture(o, "coat_roughness") ? kTexel : 0), 2);
             rename(o, "coat_weight", "clearcoat");
             set(o, "clearcoat_gloss", std::clamp((0.1 - alpha) / 0.099, 0.0, 1.0));
         }
         rename(o, "fuzz_weight", "sheen");
         const Param* thin = o.find("thin_walled");
-        const bool is_thin =
-            thin && std::get<bool>(thin->value) && !is_zero(o, "transmission_weight");
+        const bool is_seen_from_both_sides = thin && std::get<bool>(thin->value);
+        const bool is_thin = is_seen_from_both_sides && !is_zero(o, "transmission_weight");
         if (!is_thin) rename(o, "transmission_weight", "spec_trans");
         for (const char* name : {"base_weight", "base_diffuse_roughness",
                                  "specular_roughness_anisotropy", "coat_color", "coat_roughness",
                                  "coat_ior", "fuzz_color", "fuzz_roughness", "thin_walled"})
             remove(o, name);
-        if (!is_thin) return remove(o, "transmission_color");
+        if (!is_thin) {
+            remove(o, "transmission_color");
+            if (is_seen_from_both_sides && !is_nested_in(s, index, "twosided"))
+                nest_in_twosided(s, index);
+            return;
+        }
     }
     SceneObject opaque = s.object(index);
     SceneObject pane{"bsdf", "thindielectric", "", opaque.where, {}, {}},

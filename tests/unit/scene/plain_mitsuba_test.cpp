@@ -534,6 +534,35 @@ TEST(PlainMitsuba, ThinGlassOfOpenPbrIsABlendWithAPane) {
     EXPECT_EQ(*only(solid, "bsdf").find("base_color")->as<Rgb>(), Rgb(0.5f, 1, 1));
 }
 
+// The principled model of Mitsuba 3 is black from behind.
+TEST(PlainMitsuba, ThinOpaqueOpenPbrIsSeenFromBothSides) {
+    const std::string material =
+        R"(<bsdf type="openpbr" id="leaf"><boolean name="thin_walled" value="true"/>
+        <rgb name="transmission_color" value="0.5 1 1"/></bsdf>)";
+    for (const bool is_nested : {false, true}) {
+        SceneDescription scene =
+            parsed("<shape type=\"sphere\">" +
+                   (is_nested ? "<bsdf type=\"twosided\">" + material + "</bsdf>" : material) +
+                   "</shape>");
+        make_plain_mitsuba(scene);
+        int count = 0;
+        for (const SceneObject& o : scene.objects) {
+            if (o.type != "twosided") continue;
+            ++count;
+            ASSERT_EQ(o.children.size(), 1u);
+            const SceneObject& inner = scene.objects[size_t(o.children[0].object)];
+            EXPECT_EQ(inner.type, "principled");
+            EXPECT_FALSE(inner.find("thin_walled") || inner.find("transmission_color"));
+            EXPECT_EQ(o.id, is_nested ? "" : "leaf");
+        }
+        EXPECT_EQ(count, 1);
+    }
+    // A surface that is not thin stays as it is.
+    SceneDescription solid = parsed("<shape type=\"sphere\"><bsdf type=\"openpbr\"/></shape>");
+    make_plain_mitsuba(solid);
+    EXPECT_EQ(only(solid, "bsdf").type, "principled");
+}
+
 TEST(PlainMitsuba, ColoursOfMeshesAreWrittenAsFloats) {
     SceneDescription scene = read_scene_file(std::string(ETENDUE_SOURCE_DIR) +
                                              "/tests/scenes/formats/mitsuba3/textures.xml");
