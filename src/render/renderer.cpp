@@ -106,7 +106,6 @@ private:
 class FilmSplats final : public SplatSink {
 public:
     explicit FilmSplats(const Receivers& to) : to_(to) {}
-    ~FilmSplats() override { flush(); }
     FilmSplats(const FilmSplats&) = delete;
     FilmSplats& operator=(const FilmSplats&) = delete;
 
@@ -133,13 +132,14 @@ public:
     }
     /// Whether tell() does anything.
     bool needs_joins() const { return to_.techniques || to_.observer || !to_.shown.contains_all(); }
-
-private:
+    /// Adds the splats that wait; to be called at the end. Not by the destructor, since there may be no memory for a splat. What
+    /// then still waits is dropped with the pass.
     void flush() {
-        for (size_t i = 0; i < waiting_; ++i) to_.film.add_splat(queue_[i].film, queue_[i].value);
-        waiting_ = 0;
+        const size_t count = std::exchange(waiting_, 0);
+        for (size_t i = 0; i < count; ++i) to_.film.add_splat(queue_[i].film, queue_[i].value);
     }
 
+private:
     struct Splat {
         Vec2 film;
         Rgb value;
@@ -493,6 +493,7 @@ private:
                         FilmSplats splats(receivers(work));
                         work.is_observed = splats.needs_joins();
                         task(i, splats, work);
+                        splats.flush();
                     });
                 },
             .forget_statistics = [this] { r_.workers_->take_stats(); }};
