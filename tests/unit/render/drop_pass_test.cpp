@@ -22,7 +22,7 @@ public:
     struct Hooks {
         std::function<void(uint32_t pass)> trace = [](uint32_t) {}, end_of_trace = [](uint32_t) {};
         std::function<void(uint32_t pass, uint64_t index)> sample = [](uint32_t, uint64_t) {};
-        /// Before each group of paths that prepare() makes.
+        /// Before each group of paths that prepare() or trace() makes for itself.
         std::function<void(uint32_t pass)> other_paths = [](uint32_t) {};
         /// The block of memory that learn() does not get before pass 4, from 1; 0: it gets all.
         long block_of_learn = 0;
@@ -39,18 +39,11 @@ public:
     bool is_learning() const override { return inner_->is_learning(); }
     void save(LearnedState& to) const override { inner_->save(to); }
     void load(LearnedState& from) override { inner_->load(from); }
-    void prepare(const PassContext& pass) override {
-        PassContext watched = pass;
-        watched.for_each_other_path = [&](uint64_t count, const PassContext::Task& task) {
-            hooks_.other_paths(pass.index);
-            pass.for_each_other_path(count, task);
-        };
-        inner_->prepare(watched);
-    }
+    void prepare(const PassContext& pass) override { inner_->prepare(watched(pass)); }
     void trace(const PassContext& pass) override {
         pass_ = pass.index;
         hooks_.trace(pass_);
-        inner_->trace(pass);
+        inner_->trace(watched(pass));
         hooks_.end_of_trace(pass_);
     }
     std::unique_ptr<PassSums> make_sums() const override { return inner_->make_sums(); }
@@ -75,6 +68,15 @@ public:
     const std::vector<uint32_t>& learned() const { return learned_; }
 
 private:
+    PassContext watched(const PassContext& pass) const {
+        PassContext watched = pass;
+        watched.for_each_other_path = [&](uint64_t count, const PassContext::Task& task) {
+            hooks_.other_paths(pass.index);
+            pass.for_each_other_path(count, task);
+        };
+        return watched;
+    }
+
     std::unique_ptr<Integrator> inner_;
     Hooks& hooks_;
     uint32_t pass_ = 0;
@@ -331,6 +333,42 @@ TEST_P(DropTraining, AnywhereChangesNothing) {
         expect_same_bits(r.film().image(), whole.film().image());
     }
 }
+
+/// Chains train their guide in the first pass, before their pilot run and the pool of the first group.
+class DropTrainingOfChains : public DropTraining {
+protected:
+    DropTrainingOfChains() { settings.spp = 6; }
+};
+
+TEST_P(DropTrainingOfChains, AnywhereChangesNothing) {
+    const std::vector<uint32_t> passes = groups();
+    const auto first = size_t(std::count(passes.begin(), passes.end(), 0u));
+    ASSERT_GE(first, 7u);
+    ASSERT_GT(passes.size(), first) << "the pool of the second group";
+    Disturbed::Hooks none;
+    Renderer whole(scene, settings, std::make_unique<Disturbed>(GetParam(), none));
+    run(whole);
+    for (const size_t at : {size_t(1), size_t(3), size_t(4), first - 1, first}) {
+        SCOPED_TRACE(at);
+        size_t group = 0;
+        hooks.other_paths = [&](uint32_t) {
+            if (group++ == at) throw std::runtime_error("dropped");
+        };
+        Renderer r = renderer();
+        EXPECT_THROW(run(r), std::runtime_error);
+        EXPECT_EQ(run(r), StopReason::Samples);
+        expect_same_bits(r.film().image(), whole.film().image());
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Guided, DropTrainingOfChains,
+                         ::testing::Values("pssmlt:groups=2,chains=16,guide=on,guide_walks=4000",
+                                           "mmlt:groups=2,chains=48,guide=on,guide_walks=4000",
+                                           "mlt:groups=2,chains=48,guide=on,guide_walks=4000"),
+                         [](const auto& p) {
+                             const std::string name = p.param;
+                             return name.substr(0, name.find(':'));
+                         });
 
 /// An object at a distance makes what counts as a usual radiance small, so that every splat needs memory of its own.
 class DropSplats : public DropPass {
