@@ -1,6 +1,6 @@
 // Area emitter: radiance L_e from the front of a shape, or from both sides, the same in all directions. Sampling
 // chooses a primitive with probability proportional to area times mean radiance, a point uniform in area, and a
-// direction with density cos θ / π, or |cos θ| / 2π. Where the shape is masked, a ray meets it, and sees L_e, with a
+// direction with density cos θ / π, or |cos θ| / 2π. Next events take a point that Shape::sample_seen() chooses for the observer. Where the shape is masked, a ray meets it, and sees L_e, with a
 // probability equal to the opacity, so that the light it emits has this factor.
 
 #include "emitter/area.h"
@@ -18,7 +18,8 @@ class AreaEmitter final : public Emitter {
 public:
     AreaEmitter(const Shape& shape, TextureRef radiance, bool two_sided,
                 std::function<float(const TexturePoint& at)> opacity)
-        : shape_(shape), radiance_(radiance), two_sided_(two_sided), opacity_(std::move(opacity)) {
+        : shape_(shape), radiance_(radiance), two_sided_(two_sided), opacity_(std::move(opacity)),
+          leaves_out_hidden_(!two_sided || !opacity_) {
         const size_t n = shape.primitive_count();
         std::vector<double> weights(n), areas(n);
         double flux = 0, floor = 0;
@@ -78,7 +79,10 @@ public:
     }
 
     bool sample_direct(Vec3 from, FinePoint u, DirectSample& out) const override {
-        const ShapeSample s = sample_point(u);
+        const auto choice = choice_.sample(u.x);
+        const Vec2 u_point{to_float(choice.u), to_float(u.y)};
+        const ShapeSample s = leaves_out_hidden_ ? shape_.sample_seen(choice.index, from, u_point)
+                                                 : shape_.sample(choice.index, u_point);
         const Vec3 v = s.p - from;
         const float dist2 = length2(v);
         if (!(dist2 > 0)) return false;
@@ -86,16 +90,30 @@ public:
         const Vec3 wi = v * (1 / dist);
         const float cos = emitted_cos(s.ng, -wi);
         if (!(cos > 0)) return false;
-        const float pdf = pdf_[s.prim];
-        out = {s.p,  s.ng,   wi,     dist, emitted(s.uv, s.prim), pdf, pdf, pdf_direction(cos),
-               s.uv, s.prim, s.slack};
+        const float pdf = direct_pdf(s.p, s.ng, s.prim, from);
+        if (!(pdf > 0)) return false;
+        out = {s.p,
+               s.ng,
+               wi,
+               dist,
+               emitted(s.uv, s.prim),
+               pdf,
+               pdf_[s.prim],
+               pdf_direction(cos),
+               s.uv,
+               s.prim,
+               s.slack};
         return true;
+    }
+    float direct_pdf(Vec3 p, Vec3 ng, uint32_t prim, Vec3 from) const override {
+        return leaves_out_hidden_ ? pdf_[prim] * shape_.seen_density(prim, p, ng, from)
+                                  : pdf_[prim];
     }
 
     EmitterHit eval_surface(Vec3 ng, Vec2 uv, uint32_t prim, Vec3 w) const override {
         const float cos = emitted_cos(ng, w);
         if (!(cos > 0)) return {};
-        return {radiance_at(uv, prim), pdf_[prim], pdf_[prim], pdf_direction(cos)};
+        return {radiance_at(uv, prim), 0, pdf_[prim], pdf_direction(cos)};
     }
 
     Emission eval_emission(Vec3 ng, Vec2 uv, uint32_t prim, Vec3 w) const override {
@@ -145,7 +163,9 @@ private:
     TextureRef radiance_;
     bool two_sided_;
     std::function<float(const TexturePoint& at)> opacity_;  ///< Empty where the shape is opaque.
-    float factor_ = 1;                                      ///< Of the radiance.
+    /// Whether no light leaves points that are hidden behind the rest of the shape.
+    bool leaves_out_hidden_;
+    float factor_ = 1;  ///< Of the radiance.
     AliasTable choice_;
     std::vector<float> pdf_;  ///< Area density of points, by primitive.
     double power_;

@@ -48,7 +48,8 @@ struct DirectSample {
 /// Radiance and densities where an eye path hits the emitter.
 struct EmitterHit {
     Rgb Le;
-    float pdf;  ///< As DirectSample::pdf, for the previous vertex of the eye path.
+    float
+        pdf;  ///< As DirectSample::pdf, of emitters at infinity; of others see Emitter::direct_pdf().
     float pdf_y0;
     float pdf_d;
 };
@@ -61,6 +62,10 @@ public:
     virtual EmissionSample sample_emission(FinePoint u_y0, Vec2 u_d) const = 0;
     /// False where the sampled point sends no light to `from`.
     virtual bool sample_direct(Vec3 from, FinePoint u, DirectSample& out) const = 0;
+    /// Finite emitters with a surface: DirectSample::pdf at `p` of primitive `prim`, with the normal `ng`.
+    virtual float direct_pdf(Vec3 /*p*/, Vec3 /*ng*/, uint32_t /*prim*/, Vec3 /*from*/) const {
+        return 0;
+    }
     /// Whether sample_direct() reads tables that the processor's caches do not hold.
     virtual bool has_large_tables() const { return false; }
     /// Asks for the memory that sample_direct() reads there for `u` at any point, in two parts: of the search in the tables;

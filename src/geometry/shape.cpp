@@ -353,6 +353,48 @@ ShapeSample Sphere::sample(uint32_t, Vec2 u) const {
     return {g.p, g.ng, parameters(local), 0, g.slack};
 }
 
+std::optional<Sphere::Seen> Sphere::seen(Vec3 from) const {
+    constexpr double kFarthestOnSurface = 1 + 1e-4;  // of squared distances, relative to the radius
+    const Vec3d v = Vec3d(from) - Vec3d(center_);
+    const double d2 = dot(v, v), r2 = double(radius_) * double(radius_);
+    if (flip_ || !(d2 > r2 * kFarthestOnSurface)) return {};
+    const double sine2 = r2 / d2;
+    return Seen{v / std::sqrt(d2), std::sqrt(sine2), sine2 / (1 + std::sqrt(1 - sine2))};
+}
+
+ShapeSample Sphere::sample_seen(uint32_t prim, Vec3 from, Vec2 u) const {
+    const auto s = seen(from);
+    if (!s) return sample(prim, u);
+    // The direction at the angle θ from the centre meets the sphere at the angle α as seen from the centre.
+    const double from_cosine = double(u.x) * s->one_minus_cosine,
+                 sine2 = from_cosine * (2 - from_cosine), part2 = sine2 / (s->sine * s->sine),
+                 cos_a = std::min(1.0, sine2 / s->sine +
+                                           (1 - from_cosine) * std::sqrt(std::max(0.0, 1 - part2))),
+                 sin_a = std::sqrt(1 - cos_a * cos_a);
+    double sp, cp;
+    sincos(2 * std::numbers::pi * double(u.y), &sp, &cp);
+    const TangentBasis across(s->to_observer);
+    const Vec3d n = s->to_observer * cos_a + across.s * (sin_a * cp) + across.t * (sin_a * sp);
+    const auto along = [&](const Direction& axis) {
+        return n.x * axis.x + n.y * axis.y + n.z * axis.z;
+    };
+    const Direction in_axes{along(axes_[0]), along(axes_[1]), along(axes_[2])};
+    const SurfaceGeometry g = at(in_axes);
+    return {g.p, g.ng, parameters({float(in_axes.x), float(in_axes.y), float(in_axes.z)}), 0,
+            g.slack};
+}
+
+float Sphere::seen_density(uint32_t, Vec3 p, Vec3 ng, Vec3 from) const {
+    const auto s = seen(from);
+    if (!s) return 1;
+    const Vec3 v = from - p;
+    const float dist2 = length2(v), cosine = dot(ng, v);
+    if (!(cosine > 0)) return 0;
+    // 1 / (2π (1 - cos θ)) per solid angle, times |cos|/d², times 4πr².
+    return float(2 * double(radius_) * double(radius_) / s->one_minus_cosine) * cosine /
+           (dist2 * std::sqrt(dist2));
+}
+
 bool Sphere::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {
     const double ox = double(o.x) - center_.x, oy = double(o.y) - center_.y,
                  oz = double(o.z) - center_.z;

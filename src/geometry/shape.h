@@ -55,6 +55,14 @@ public:
     virtual float slack(uint32_t) const { return 0; }
     /// Uniform in area on primitive `prim`.
     virtual ShapeSample sample(uint32_t prim, Vec2 u) const = 0;
+    /// A point of `prim` for an observer at `from`. Points that an opaque shape hides from there may be left out.
+    virtual ShapeSample sample_seen(uint32_t prim, Vec3 /*from*/, Vec2 u) const {
+        return sample(prim, u);
+    }
+    /// Density of sample_seen() at `p` with the normal `ng`, relative to that of sample().
+    virtual float seen_density(uint32_t /*prim*/, Vec3 /*p*/, Vec3 /*ng*/, Vec3 /*from*/) const {
+        return 1;
+    }
     virtual size_t memory_bytes() const { return sizeof(*this); }
 };
 
@@ -151,6 +159,9 @@ public:
     std::optional<SurfaceJet> jet(uint32_t, Vec3d o, Vec3d d, double near) const override;
     float slack(uint32_t) const override { return slack_; }
     ShapeSample sample(uint32_t, Vec2 u) const override;
+    /// From outside, uniform in the solid angle of the sphere.
+    ShapeSample sample_seen(uint32_t, Vec3 from, Vec2 u) const override;
+    float seen_density(uint32_t, Vec3 p, Vec3 ng, Vec3 from) const override;
     bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const override;
     Vec2 parameters(Vec3 local) const override;
 
@@ -158,6 +169,14 @@ private:
     struct Direction {
         double x, y, z;
     };
+    /// The sphere as an observer outside sees it.
+    struct Seen {
+        Vec3d to_observer;  ///< Unit vector from the centre.
+        double sine;        ///< Of half the angle that the sphere subtends.
+        double one_minus_cosine;
+    };
+    /// Empty where the observer is not outside, or normals point inward.
+    std::optional<Seen> seen(Vec3 from) const;
     /// The point and its normals.
     SurfaceGeometry at(const Direction& in_axes) const;
     void choose_axes();

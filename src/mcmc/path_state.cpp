@@ -121,7 +121,10 @@ bool PathState::evaluate(int first, int last) {
                                        ? e.eval_infinite(x0.v.p)
                                        : e.eval_surface(x0.v.ng, x0.v.uv, x0.v.location.prim, w);
             x0.light_ *= double(hit.pdf_y0);
-            x0.next_event_ *= double(hit.pdf);
+            x0.next_event_ *=
+                e.is_infinite()
+                    ? double(hit.pdf)
+                    : double(e.direct_pdf(x0.v.p, x0.v.ng, x0.v.location.prim, x_[1].v.p));
         }
         x_[1].light_ = emission.pdf_d * geometry(0, 1);
     }

@@ -35,7 +35,7 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
     if (e.Le.is_zero()) return {};
 
     // From the split before x_0 outward: next event has its own density of x_0, all others have the emission's.
-    const double p_NE = double(next_event_pmf(z[last - 1], emitter)) * e.pdf / v.pdf_fwd;
+    const double p_NE = next_event_pdf(z[last - 1], v, emitter, e) / v.pdf_fwd;
     const double p_L = counts.uses_light_paths()
                            ? double(emission_pmf(counts.guide, emitter)) *
                                  origin_pdf(counts.guide, emitter, v.p, e.pdf_y0) / v.pdf_fwd

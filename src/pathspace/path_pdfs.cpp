@@ -132,7 +132,9 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
             p.next_event = lights->pmf(emitter.index, emitter.selection_pmf);
     if (p.can_hit_emitter) {
         p.light[0] *= origin_pdf(guide, emitter, x[0]->p, hit.pdf_y0);
-        p.next_event *= hit.pdf;
+        p.next_event *= emitter.is_infinite()
+                            ? hit.pdf
+                            : emitter.direct_pdf(x[0]->p, x[0]->ng, x[0]->location.prim, x[1]->p);
     }
     p.light[1] =
         to_area(emission_pdf(guide, emitter, x[0]->p, x[0]->ng, w0, emission.pdf_d), *x[0], *x[1]);

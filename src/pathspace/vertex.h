@@ -206,6 +206,14 @@ float learned_selection_pmf(const LightSelection& lights, const Emitter& emitter
 inline float next_event_pmf(const Vertex& v, const Emitter& emitter) {
     return v.lights ? learned_selection_pmf(*v.lights, emitter) : emitter.selection_pmf;
 }
+/// p_NE(y_0): density with which next events at `v` sample y_0 = `y0` of an emitter, the selection included. `hit` is what is
+/// known of y_0.
+inline double next_event_pdf(const Vertex& v, const Vertex& y0, const Emitter& emitter,
+                             const EmitterHit& hit) {
+    const float point =
+        emitter.is_infinite() ? hit.pdf : emitter.direct_pdf(y0.p, y0.ng, y0.location.prim, v.p);
+    return double(next_event_pmf(v, emitter)) * double(point);
+}
 float guided_emission_pmf(const Guide& guide, const Emitter& emitter);
 /// Probability that light paths choose the emitter.
 inline float emission_pmf(const Guide* guide, const Emitter& emitter) {

@@ -148,9 +148,10 @@ float next_event_ratio(const Vertex& y0, const Vertex& next, Vec3 w, const Guide
     const EmitterHit e = y0.is_infinite
                              ? y0.emitter->eval_infinite(y0.p)
                              : y0.emitter->eval_surface(y0.ng, y0.uv, y0.location.prim, w);
-    const float choices = next_event_pmf(next, *y0.emitter) / emission_pmf(guide, *y0.emitter);
-    const float pdf_y0 = origin_pdf(guide, *y0.emitter, y0.p, e.pdf_y0);
-    return pdf_y0 > 0 ? choices * e.pdf / pdf_y0 : choices;
+    const float by_light = emission_pmf(guide, *y0.emitter),
+                pdf_y0 = origin_pdf(guide, *y0.emitter, y0.p, e.pdf_y0);
+    return pdf_y0 > 0 ? float(next_event_pdf(next, y0, *y0.emitter, e) / double(by_light * pdf_y0))
+                      : next_event_pmf(next, *y0.emitter) / by_light;
 }
 
 void start_eye_path(const WalkContext& walk, const Film& film, uint64_t index, Sampler& sampler,

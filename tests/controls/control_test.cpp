@@ -146,6 +146,7 @@ std::vector<Planted> planted() {
         {"EmissionPmfNotInNextEvent", lamps, "bdpt:roulette=0,guide=random", Lengths, 0},
         {"SelectionNotInNextEvents", lamps, "bdpt:roulette=0,guide=random", Image | Lengths, 0},
         {"SelectionNotInHits", lamps, "bdpt:roulette=0,guide=random", Lengths, 0},
+        {"UniformPointsOfSpheresInHits", lamps, "path", Lengths, 0},
         {"SelectionNotInRatio", lamps, "bdpt:roulette=0,guide=random", Lengths, 0},
         {"CachedGuideLost", lit_room, "vcm:merges=false,roulette=0,guide=random", Lengths, 0},
         {"TrialsWithoutGuide", lit_room, "upg+bdpt:radius=0.3,roulette=0,guide=random", Lengths, 0},

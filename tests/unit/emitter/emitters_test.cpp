@@ -124,6 +124,59 @@ TEST(AreaEmitter, TwoSidedShinesTheSameFromTheBack) {
     EXPECT_NEAR(double(front) / kSamples, 0.5, 4 * 0.5 / std::sqrt(double(kSamples)));
 }
 
+/// From outside, the points of a sphere lie on the part that is seen, and are uniform in solid angle: a term of the light at the
+/// observer then has no variance.
+TEST(AreaEmitter, SpheresAreSampledBySolidAngle) {
+    const Vec3 center{1, -2, 0.5f};
+    for (const float radius : {1.0f, 1e-3f}) {
+        const Sphere sphere(center, radius, false);
+        const auto emitter = make_area_emitter(sphere, Rgb(1));
+        for (const float distance : {1.001f, 1.5f, 20.0f, 3000.0f}) {
+            const Vec3 from = center + normalize({0.3f, -0.5f, 0.8f}) * (radius * distance);
+            const double sine = 1 / double(distance),
+                         solid_angle = 2 * M_PI * sine * sine / (1 + std::sqrt(1 - sine * sine));
+            testing::Random random(6);
+            Vec3 mean;
+            constexpr int kPoints = 4000;
+            for (int i = 0; i < kPoints; ++i) {
+                DirectSample s;
+                const bool lit =
+                    emitter->sample_direct(from, {random.next_1d(), random.next_1d()}, s);
+                mean = mean + normalize(s.p - from) * (1.0f / kPoints);
+                if (!lit) continue;  // at the rim
+                ASSERT_NEAR(length(s.p - center), radius, 1e-5f * radius + 1e-6f);
+                ASSERT_EQ(s.pdf, emitter->direct_pdf(s.p, s.ng, s.prim, from));
+                ASSERT_FLOAT_EQ(s.pdf_y0, float(1 / sphere.area()));
+                // The rounding of points is large beside a distant small sphere, and at its rim.
+                const double cosine = -double(dot(s.ng, s.wi));
+                if (radius < 1 || cosine < 0.05) continue;
+                ASSERT_NEAR(cosine / (double(sqr(s.dist)) * double(s.pdf)) / solid_angle, 1, 1e-3)
+                    << distance;
+            }
+            // The mean of cos θ over the cone.
+            const double expected = (1 + std::sqrt(1 - sine * sine)) / 2;
+            EXPECT_NEAR(double(dot(mean, normalize(center - from))), expected, 0.02);
+        }
+    }
+}
+
+/// By rays that meet the sphere, which know nothing of how it is sampled: ∫ p dA = 1.
+TEST(AreaEmitter, DensityOfSpheresIsOneInTotal) {
+    const Sphere sphere({0, 0, 0}, 1, false), inward({0, 0, 0}, 1, true);
+    for (const bool two_sided : {false, true})
+        for (const Sphere* s : {&sphere, &inward})
+            for (const Vec3 from : {Vec3{0, 0.2f, 0.1f}, Vec3{0.8f, 0.9f, 0}, Vec3{5, -1, 2}}) {
+                const auto emitter = make_area_emitter(*s, Rgb(1), two_sided);
+                testing::Random random(7);
+                double sum = 0;
+                for (int i = 0; i < kSamples; ++i) {
+                    const ShapeSample at = s->sample(0, random.next_2d());
+                    sum += double(emitter->direct_pdf(at.p, at.ng, 0, from)) * s->area();
+                }
+                EXPECT_NEAR(sum / kSamples, 1, 0.02);
+            }
+}
+
 TEST(AreaEmitter, IsScaledToAPower) {
     const Disk disk(Transform(), false);
     const auto emitter = make_area_emitter(disk, Rgb(3), true, 100);
