@@ -24,8 +24,9 @@ Film::Film(const FilmGeometry& geometry, const ReconstructionFilter& filter,
            double typical_radiance, FilterMode mode)
     : geometry_(geometry), filter_(filter),
       spreads_(mode == FilterMode::Spread && filter.is_wide()),
-      grid_(geometry, filter, {0.5f, 0.5f}), pass_(geometry_, filter_, typical_radiance),
-      moments_(geometry.pixel_count()), expected_(geometry), previous_(geometry.pixel_count()) {
+      grid_(geometry, filter, {0.5f, 0.5f}),
+      pass_(geometry_, filter_, typical_radiance, sample_count()), moments_(geometry.pixel_count()),
+      expected_(geometry), previous_(geometry.pixel_count()) {
     set_ranks(kAlone);
 }
 
@@ -79,7 +80,7 @@ void Film::end_pass(double splat_factor) {
     pass_.finish();
     fold(pass_, splat_factor);
     rejected_ += pass_.rejected();
-    pass_.clear();
+    pass_.clear_after_splats();
 }
 
 void Film::finish_pass() {
@@ -177,6 +178,7 @@ void Film::fold(Pass& pass, double splat_factor) {
         pair_sum[chunk] = pairs, pass_sum[chunk] = errors;
     });
     pair_errors_.push_back(sum_of_chunks(pair_sum) / double(n));
+    count_last_pair();
     error2_of_pass_ = sum_of_chunks(pass_sum) / double(n);
 }
 
@@ -298,7 +300,13 @@ double Film::variance_of_pixels() const {
 }
 
 size_t Film::noisy_pairs() const {
-    return is_merged_ ? 0 : std::min<size_t>(pair_errors_.size() / 4, 8);
+    return is_merged_ ? 0 : std::min<size_t>(pair_errors_.size() / 4, kMostNoisyPairs);
+}
+
+void Film::count_last_pair() {
+    if (pair_errors_.size() <= kMostNoisyPairs) return;
+    later_pairs_.sum += pair_errors_.back();
+    later_pairs_.squares += sqr(pair_errors_.back());
 }
 
 double Film::error2_of_pass(uint64_t pixel, double mean) const {
@@ -327,8 +335,11 @@ ErrorEstimate Film::error() const {
     const size_t skip = noisy_pairs();
     const size_t count = pair_errors_.size() - skip;
     if (count < 4) return e;
+    // Called after every pass: the sums of many pairs are at hand.
     double mean = 0, square = 0;
-    for (size_t i = skip; i < pair_errors_.size(); ++i) {
+    const bool has_sums = skip == kMostNoisyPairs;
+    if (has_sums) mean = later_pairs_.sum, square = later_pairs_.squares;
+    for (size_t i = has_sums ? pair_errors_.size() : skip; i < pair_errors_.size(); ++i) {
         mean += pair_errors_[i];
         square += sqr(pair_errors_[i]);
     }

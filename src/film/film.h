@@ -43,7 +43,7 @@ public:
     Film(const Film&) = delete;
     Film& operator=(const Film&) = delete;
 
-    /// Memory of a film, by pixel, without the samples of a grid's margin. `groups`: see set_groups(). `has_ranks`: whether
+    /// Memory of a film, by pixel, without the samples of a grid's margin and the digits of large splats. `groups`: see set_groups(). `has_ranks`: whether
     /// several processes render the image.
     static uint64_t bytes_per_pixel(bool has_splats, int groups, bool has_ranks = false) {
         return sizeof(PixelMoments) + sizeof(Rgb) +
@@ -185,6 +185,9 @@ private:
     /// Number of pairs of passes at the beginning whose errors are relative to a mean that was still noisy. They are left
     /// out when there are others, but not in a sum of films, where all may be like that: only their spread matters.
     size_t noisy_pairs() const;
+    static constexpr size_t kMostNoisyPairs = 8;
+    /// Adds the last pair to later_pairs_.
+    void count_last_pair();
     /// Adds the pixels of this process to the totals. A `Pass` has the functions eye() and add_splats() of PassImage.
     template <class Pass>
     void fold(Pass& pass, double splat_factor);
@@ -209,6 +212,10 @@ private:
     /// Their mean would be too small: each is divided by the square of the image up to its pair, which is brighter where
     /// the pair is.
     std::vector<double> pair_errors_;
+    /// Sums over the pairs from kMostNoisyPairs on, of a film that is not merged.
+    struct {
+        double sum = 0, squares = 0;
+    } later_pairs_;
     /// Relative squared error of one pass, from the moments after the last pair.
     double error2_of_pass_ = 0;
     std::vector<double> pass_means_;

@@ -45,9 +45,15 @@ void Film::load(SectionReader& from) {
     is_merged_ = from.get<uint8_t>() != 0;
     from.get(moments_, pixels, "pixels");
     from.get(pass_means_, passes_, "means of passes");
-    from.get(pair_errors_);
-    if (pair_errors_.size() > passes_ / 2)
-        from.fail(fmt::format("{} pairs of {} passes", pair_errors_.size(), passes_));
+    std::vector<double> pairs;
+    from.get(pairs);
+    if (pairs.size() > passes_ / 2)
+        from.fail(fmt::format("{} pairs of {} passes", pairs.size(), passes_));
+    pair_errors_.clear(), later_pairs_ = {};
+    for (const double error : pairs) {
+        pair_errors_.push_back(error);
+        count_last_pair();
+    }
     from.get(error2_of_pass_);
     from.get(group_passes_);
     if (has_groups() && group_passes_.size() != group_sums_.size())

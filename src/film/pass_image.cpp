@@ -41,7 +41,6 @@ void PassImage::begin(uint64_t light_paths, const SampleGrid* grid) {
                                                 typical_radiance_);
     splat_scale_ = light_paths > 0 ? float(1.0 / double(light_paths)) : 0.0f;
     grid_ = grid;
-    samples_.resize(grid ? grid->count() : geometry_.pixel_count());
 }
 
 void PassImage::add_splat(Vec2 point, Rgb value) {
@@ -125,6 +124,15 @@ void PassImage::add_splats(uint64_t begin, std::span<Rgb> to) {
 
 void PassImage::clear() {
     if (splats_) splats_->clear();
+    clear_samples();
+}
+
+void PassImage::clear_after_splats() {
+    if (splats_) splats_->forget_rejected();
+    clear_samples();
+}
+
+void PassImage::clear_samples() {
     for_film_chunks(samples_.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
         std::fill(samples_.begin() + std::ptrdiff_t(begin), samples_.begin() + std::ptrdiff_t(end),
                   Rgb());

@@ -26,10 +26,11 @@ enum class FilterMode {
 /// must outlive it.
 class PassImage {
 public:
+    /// `samples`: number of eye paths of a pass, those of a grid's margin included.
     PassImage(const FilmGeometry& geometry, const ReconstructionFilter& filter,
-              double typical_radiance)
+              double typical_radiance, uint64_t samples)
         : geometry_(geometry), filter_(filter), typical_radiance_(typical_radiance),
-          samples_(geometry.pixel_count()) {}
+          samples_(samples) {}
 
     /// `light_paths`: number of light paths of the pass; 0 if there are none. `grid`: the film points of the eye paths,
     /// if their contributions are spread by the filter.
@@ -54,8 +55,11 @@ public:
     }
     /// Resets the image to black.
     void clear();
+    /// The same after add_splats() of all pixels, which leaves no splats.
+    void clear_after_splats();
 
 private:
+    void clear_samples();
     void reject_if_not_finite(Rgb& value);
     /// Sets `to` to the pixels of a row of the crop from `column` on.
     void convolve(int row, int column, std::span<Rgb> to) const;

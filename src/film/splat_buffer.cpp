@@ -36,7 +36,7 @@ SplatBuffer::SplatBuffer(int width, int height, double typical_radiance)
     : width_(width), tiles_across_((width + kTileWidth - 1) / kTileWidth),
       unit_(std::ldexp(1.0, unit_exponent(typical_radiance))), units_per_radiance_(1 / unit_),
       lowest_(size_t(width) * size_t(height) * 3),
-      locks_(size_t(tiles_across_) * size_t((height + kTileHeight - 1) / kTileHeight)) {}
+      tiles_(size_t(tiles_across_) * size_t((height + kTileHeight - 1) / kTileHeight)) {}
 
 void SplatBuffer::add(int column, int row, Rgb value, std::span<const float> x,
                       std::span<const float> y) {
@@ -51,28 +51,30 @@ void SplatBuffer::add(int column, int row, Rgb value, std::span<const float> x,
         for (int left = column, end = 0; left < right; left = end) {
             end = std::min(right, (left / kTileWidth + 1) * kTileWidth);
             const size_t first = 3 * size_t(left - column), cells = 3 * size_t(end - left);
-            const tbb::spin_mutex::scoped_lock lock(lock_of(left, top).mutex);
+            Tile& tile = tile_of(left, top);
+            const tbb::spin_mutex::scoped_lock lock(tile.mutex);
             for (int j = top; j < next; ++j)
-                add_row((uint64_t(j) * uint64_t(width_) + uint64_t(left)) * 3, colours + first,
-                        weights + first, cells, y[size_t(j - row)]);
+                add_row(cells_of(tile, left, j), colours + first, weights + first, cells,
+                        y[size_t(j - row)]);
         }
     }
 }
 
 void SplatBuffer::add_to_pixel(int column, int row, Rgb value) {
-    const uint64_t first_cell = (uint64_t(row) * uint64_t(width_) + uint64_t(column)) * 3;
     const double units[3] = {double(value.r) * units_per_radiance_,
                              double(value.g) * units_per_radiance_,
                              double(value.b) * units_per_radiance_};
-    const tbb::spin_mutex::scoped_lock lock(lock_of(column, row).mutex);
-    for (uint64_t c = 0; c < 3; ++c) {
+    Tile& tile = tile_of(column, row);
+    const tbb::spin_mutex::scoped_lock lock(tile.mutex);
+    const Cells cells = cells_of(tile, column, row);
+    for (size_t c = 0; c < 3; ++c) {
         if (!(std::fabs(units[c]) < kLarge)) [[unlikely]]
-            return add_large(first_cell, units, 1);
+            return add_large(cells, units, 1);
     }
-    for (uint64_t c = 0; c < 3; ++c) add(0, first_cell + c, nearest(units[c]));
+    for (size_t c = 0; c < 3; ++c) add(0, cells + c, nearest(units[c]));
 }
 
-void SplatBuffer::add_row(uint64_t first_cell, const float* colours, const float* weights,
+void SplatBuffer::add_row(const Cells& cells, const float* colours, const float* weights,
                           size_t count, float y) {
     double units[3 * kMostTaps];
     int large = 0;
@@ -81,62 +83,61 @@ void SplatBuffer::add_row(uint64_t first_cell, const float* colours, const float
         large |= int(!(std::fabs(units[k]) < kLarge));
     }
     if (large) [[unlikely]]
-        return add_large(first_cell, units, count / 3);
-    int64_t* const cells = &lowest_[first_cell];
+        return add_large(cells, units, count / 3);
+    int64_t* const lowest = &lowest_[cells.lowest];
     int full = 0;
     for (size_t k = 0; k < count; ++k) {
-        cells[k] += nearest(units[k]);
-        full |= int(cells[k] >= kFull || cells[k] <= -kFull);
+        lowest[k] += nearest(units[k]);
+        full |= int(lowest[k] >= kFull || lowest[k] <= -kFull);
     }
     if (full) [[unlikely]]
-        for (size_t k = 0; k < count; ++k) add(0, first_cell + k, 0);
+        for (size_t k = 0; k < count; ++k) add(0, cells + k, 0);
 }
 
-void SplatBuffer::add_large(uint64_t first_cell, const double* units, size_t pixels) {
-    for (size_t i = 0; i < pixels; ++i, units += 3, first_cell += 3) {
+void SplatBuffer::add_large(const Cells& cells, const double* units, size_t pixels) {
+    for (size_t i = 0; i < pixels; ++i, units += 3) {
         if (!std::all_of(units, units + 3, [](double u) { return std::isfinite(u); })) {
             rejected_.fetch_add(1, std::memory_order_relaxed);
             continue;
         }
-        for (uint64_t c = 0; c < 3; ++c) {
+        for (size_t c = 0; c < 3; ++c) {
+            const Cells cell = cells + (3 * i + c);
             if (std::fabs(units[c]) < kLarge) {
-                add(0, first_cell + c, nearest(units[c]));
+                add(0, cell, nearest(units[c]));
                 continue;
             }
             // A float has 24 bits. The lowest of them is 2^(26·digit) units or more.
             const int digit = (std::ilogb(units[c]) - 23) / kDigitBits;
-            add(size_t(digit), first_cell + c, int64_t(std::ldexp(units[c], -kDigitBits * digit)));
+            add(size_t(digit), cell, int64_t(std::ldexp(units[c], -kDigitBits * digit)));
         }
     }
 }
 
-void SplatBuffer::add(size_t digit, uint64_t cell, int64_t n) {
-    int64_t& sum = (digit == 0 ? lowest_.data() : higher(digit))[cell];
-    sum += n;
-    if (sum < kFull && sum > -kFull) return;
-    const int64_t carried = sum >> kDigitBits;
-    sum -= carried << kDigitBits;
+void SplatBuffer::add(size_t digit, const Cells& cell, int64_t n) {
+    int64_t* sum = &lowest_[cell.lowest];
+    if (digit > 0) {
+        auto& higher = cell.tile.higher[digit - 1];
+        if (!higher) higher = std::make_unique<int64_t[]>(kTileCells);
+        sum = &higher[cell.higher];
+    }
+    *sum += n;
+    if (*sum<kFull&& * sum> - kFull) return;
+    const int64_t carried = *sum >> kDigitBits;
+    *sum -= carried << kDigitBits;
     add(digit + 1, cell, carried);
 }
 
-int64_t* SplatBuffer::higher(size_t digit) {
-    if (int64_t* cells = higher_[digit].load(std::memory_order_acquire)) return cells;
-    const std::scoped_lock lock(making_);
-    if (!owned_[digit]) {
-        owned_[digit] = std::make_unique<int64_t[]>(lowest_.size());
-        higher_[digit].store(owned_[digit].get(), std::memory_order_release);
-    }
-    return owned_[digit].get();
-}
-
-double SplatBuffer::take(uint64_t cell, size_t digits) {
+double SplatBuffer::take(const Cells& cell) {
+    size_t digits = kDigits;
+    while (digits > 1 && !cell.tile.higher[digits - 2]) --digits;
     // Carries until all digits except the last lie in [0, 2^26). This representation is unique.
     constexpr int64_t kMask = (int64_t(1) << kDigitBits) - 1;
     std::array<int64_t, kDigits> sum{};
-    int64_t passed = 0;
+    int64_t passed = std::exchange(lowest_[cell.lowest], 0);
     for (size_t j = 0; j < digits; ++j) {
-        if (int64_t* cells = j == 0 ? lowest_.data() : owned_[j].get())
-            passed += std::exchange(cells[cell], 0);
+        if (j > 0)
+            if (int64_t* const higher = cell.tile.higher[j - 1].get())
+                passed += std::exchange(higher[cell.higher], 0);
         sum[j] = j + 1 < digits ? passed & kMask : passed;
         passed >>= kDigitBits;
     }
@@ -147,7 +148,7 @@ double SplatBuffer::take(uint64_t cell, size_t digits) {
 
 void SplatBuffer::prefetch(int column, int row, int columns, int rows) const {
     constexpr size_t kLine = 64 / sizeof(int64_t);
-    __builtin_prefetch(&lock_of(column, row), 1);
+    __builtin_prefetch(&tile_of(column, row), 1);
     for (int j = row; j < row + rows; ++j) {
         const size_t first = (size_t(j) * size_t(width_) + size_t(column)) * 3;
         for (size_t k = 0; k < 3 * size_t(columns) + kLine - 1; k += kLine)
@@ -157,15 +158,24 @@ void SplatBuffer::prefetch(int column, int row, int columns, int rows) const {
 
 template <class To>
 void SplatBuffer::fold(uint64_t first, std::span<To> to) {
-    size_t digits = kDigits;
-    while (digits > 1 && !owned_[digits - 1]) --digits;
-    for (size_t k = 0; k < to.size(); ++k)
-        for (int c = 0; c < 3; ++c) {
-            const uint64_t cell = (first + k) * 3 + uint64_t(c);
-            const double units =
-                digits == 1 ? double(std::exchange(lowest_[cell], 0)) : take(cell, digits);
-            add_to(to[k], c, units * unit_);
-        }
+    const auto width = uint64_t(width_);
+    for (size_t k = 0; k < to.size();) {
+        // The pixels of a row of a tile.
+        const uint64_t pixel = first + k;
+        const int column = int(pixel % width), row = int(pixel / width);
+        const int end = std::min((column / kTileWidth + 1) * kTileWidth, width_);
+        Tile& tile = tile_of(column, row);
+        const bool has_large = std::any_of(tile.higher.begin(), tile.higher.end(),
+                                           [](const auto& digit) { return digit != nullptr; });
+        Cells cells = cells_of(tile, column, row);
+        for (const size_t last = std::min(to.size(), k + size_t(end - column)); k < last; ++k)
+            for (int c = 0; c < 3; ++c) {
+                add_to(to[k], c,
+                       unit_ * (has_large ? take(cells)
+                                          : double(std::exchange(lowest_[cells.lowest], 0))));
+                ++cells.lowest, ++cells.higher;
+            }
+    }
 }
 template void SplatBuffer::fold(uint64_t, std::span<Rgb>);
 
@@ -176,15 +186,11 @@ void SplatBuffer::fold_into(std::span<Sum> sums) {
 }
 
 void SplatBuffer::clear() {
-    const auto clear = [&](int64_t* cells) {
-        for_film_chunks(lowest_.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
-            std::fill(cells + begin, cells + end, 0);
-        });
-    };
-    clear(lowest_.data());
-    for (const auto& cells : owned_)
-        if (cells) clear(cells.get());
-    rejected_.store(0, std::memory_order_relaxed);
+    for_film_chunks(lowest_.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
+        std::fill(&lowest_[begin], &lowest_[begin] + (end - begin), 0);
+    });
+    for (Tile& tile : tiles_) tile.higher = {};
+    forget_rejected();
 }
 
 }  // namespace etendue

@@ -5,7 +5,6 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <span>
 #include <vector>
 
@@ -20,10 +19,10 @@ namespace etendue {
 /// A sum consists of digits in base 2^26, each in 64 bits: digit j counts multiples of unit·2^(26j), where the unit is
 /// a power of two, 2^-40 of a typical radiance. A value below 2^50 units is rounded to the nearest unit and added to
 /// digit 0. A larger value is added to the digit that can represent all its bits. Before a digit overflows, most of its
-/// value is carried to the next digit. Therefore no value is too large, and no sum overflows. Digits above 0 are
-/// allocated when they are needed.
+/// value is carried to the next digit. Therefore no value is too large, and no sum overflows.
 ///
-/// A pixel belongs to a tile, which one thread at a time adds to: a splat of many pixels needs one lock for each tile.
+/// A pixel belongs to a tile, which one thread at a time adds to: a splat of many pixels needs one lock for each tile. Digits
+/// above 0 are allocated when they are needed, for the pixels of a tile.
 class SplatBuffer {
 public:
     /// Values may have any magnitude; the precision of small ones is relative to `typical_radiance`.
@@ -42,12 +41,18 @@ public:
     void prefetch(int column, int row, int columns, int rows) const;
     /// Number of values that were left out since the buffer was made or cleared.
     uint64_t rejected() const { return rejected_.load(std::memory_order_relaxed); }
-    /// Adds the sums of the pixels from `first` on to `to`, rounded once, and sets them to 0.
+    /// The tiles, and the memory that one of them needs for a digit of large splats.
+    static constexpr int kTileWidth = 64, kTileHeight = 16;
+    static constexpr size_t kTileCells = size_t(3) * kTileWidth * kTileHeight,
+                            kBytesOfLargeSplats = kTileCells * sizeof(int64_t);
+    /// Adds the sums of the pixels from `first` on to `to`, and sets them to 0.
     void fold_into(uint64_t first, std::span<Rgb> to) { fold(first, to); }
     /// Adds every sum to the sums of many passes, in parallel, and clears the buffer.
     using Sum = std::array<double, 3>;
     void fold_into(std::span<Sum> sums);
     void clear();
+    /// The same after all sums have been folded.
+    void forget_rejected() { rejected_.store(0, std::memory_order_relaxed); }
 
 private:
     static constexpr int kDigitBits = 26;
@@ -57,38 +62,45 @@ private:
     static constexpr double kLarge = 0x1p50;
     /// A digit that reaches this is carried. Until then a value of 2^50 does not overflow it.
     static constexpr int64_t kFull = int64_t(1) << 61;
-    static constexpr int kTileWidth = 64, kTileHeight = 16;
-    /// In a cache line of its own, so that threads at neighbouring tiles do not wait for each other.
-    struct alignas(64) TileLock {
+    /// In cache lines of its own, so that threads at neighbouring tiles do not wait for each other.
+    struct alignas(64) Tile {
         tbb::spin_mutex mutex;
+        std::array<std::unique_ptr<int64_t[]>, kDigits - 1> higher;  ///< Digits above 0.
+    };
+    /// A cell, or the first of adjacent ones of a row of a tile, whose lock is held.
+    struct Cells {
+        Tile& tile;
+        uint64_t lowest;  ///< In lowest_,
+        size_t higher;    ///< and in Tile::higher.
+
+        Cells operator+(size_t k) const { return {tile, lowest + k, higher + k}; }
     };
 
-    TileLock& lock_of(int column, int row) const {
-        return locks_[size_t(row / kTileHeight) * size_t(tiles_across_) +
+    Tile& tile_of(int column, int row) const {
+        return tiles_[size_t(row / kTileHeight) * size_t(tiles_across_) +
                       size_t(column / kTileWidth)];
     }
+    Cells cells_of(Tile& tile, int column, int row) const {
+        return {tile, (uint64_t(row) * uint64_t(width_) + uint64_t(column)) * 3,
+                3 * size_t(row % kTileHeight * kTileWidth + column % kTileWidth)};
+    }
     void add_to_pixel(int column, int row, Rgb value);
-    /// Adds colours[k]·weights[k]·y to `count` adjacent cells of a tile whose lock is held.
-    void add_row(uint64_t first_cell, const float* colours, const float* weights, size_t count,
+    /// Adds colours[k]·weights[k]·y to `count` cells.
+    void add_row(const Cells& cells, const float* colours, const float* weights, size_t count,
                  float y);
     /// Values, in units, some of which may be large or not finite.
-    void add_large(uint64_t first_cell, const double* units, size_t pixels);
-    /// Adds n, which is at most 2^61, to a digit.
-    void add(size_t digit, uint64_t cell, int64_t n);
-    /// The cells of a digit above 0; allocated on first use.
-    int64_t* higher(size_t digit);
-    /// Returns the sum in units, rounded once, and sets the cell to 0.
-    double take(uint64_t cell, size_t digits);
+    void add_large(const Cells& cells, const double* units, size_t pixels);
+    /// Adds n, which is at most 2^61, to a digit of the first cell.
+    void add(size_t digit, const Cells& cell, int64_t n);
+    /// Returns the sum of the first cell in units, rounded after every digit, and sets it to 0.
+    double take(const Cells& cell);
     template <class To>
     void fold(uint64_t first, std::span<To> to);
 
     int width_, tiles_across_;
     double unit_, units_per_radiance_;
     std::vector<int64_t> lowest_;
-    std::array<std::unique_ptr<int64_t[]>, kDigits> owned_;
-    std::array<std::atomic<int64_t*>, kDigits> higher_{};
-    std::mutex making_;
-    mutable std::vector<TileLock> locks_;
+    mutable std::vector<Tile> tiles_;
     std::atomic<uint64_t> rejected_{0};
 };
 

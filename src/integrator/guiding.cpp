@@ -337,7 +337,8 @@ std::vector<ParamInfo> Guiding::params(GuideRefits refits) {
               "pass. A refit traces as many, before the first of passes 1, 4, 16, 64 … at which "
               "the image has had 8, 64, 512 … times as many samples.";
     return {{"guide", ParamKind::String, "off",
-             "Learned directions for the walks: off, on, or auto (on, unless the training shows "
+             "Learned directions for the walks, and lamps for next events: off, on, or auto (on, "
+             "unless the training shows "
              "that it gains too little). hp02 (experimental, for comparisons) guides eye walks "
              "alone, by footprints of photons [Hey & Purgathofer 2002]."},
             {"guide_walks", ParamKind::Int, "100000", walks},
@@ -376,12 +377,16 @@ bool Guiding::gains_little(const Guide& guide, GuidedWalks walks) {
     return true;
 }
 
+bool Guiding::guides_surfaces_by_auto(const Guide& guide, GuidedWalks walks) {
+    return guide.uses_surfaces && (walks != GuidedWalks::Eye ||
+                                   guide.surfaces.gain(TransportMode::Radiance) >= kLeastGainAlone);
+}
+
 bool Guiding::gains_nothing(const Guide& guide, GuidedWalks walks) const {
     // Neither what emission gains nor adjoint-driven roulette depends on them. In the scenes of docs/guiding.md, one of the
     // two gains 2.9 nats, or both at most 0.3: on veach-bidir, where guided directions make a sample worse.
     constexpr float kLeastGain = 0.5f;
-    if (mode_ == Mode::Auto && walks == GuidedWalks::Eye)
-        return guide.surfaces.gain(TransportMode::Radiance) < kLeastGainAlone;
+    if (mode_ == Mode::Auto && !guides_surfaces_by_auto(guide, walks)) return true;
     return joins_both(walks) && mode_ != Mode::Footprints &&
            std::max(guide.surfaces.gain(TransportMode::Radiance),
                     guide.surfaces.gain(TransportMode::Importance)) < kLeastGain;

@@ -34,6 +34,8 @@ public:
     const Guide* guide() const { return guide_.get(); }
     /// Whether a guide gains so little that `auto` does without it.
     static bool gains_little(const Guide& guide, GuidedWalks walks);
+    /// Whether `auto` guides walks at surfaces by a guide that it keeps.
+    static bool guides_surfaces_by_auto(const Guide& guide, GuidedWalks walks);
 
     void save(LearnedState& to) const;
     void load(LearnedState& from);

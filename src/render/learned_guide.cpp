@@ -155,6 +155,12 @@ bool LearnedGuide::is_kept_by_auto() const {
     return !Guiding::gains_little(guide(), guided_walks(method_));
 }
 
+Guide LearnedGuide::guide_of_auto() const {
+    Guide used = guide();
+    used.uses_surfaces = Guiding::guides_surfaces_by_auto(used, guided_walks(method_));
+    return used;
+}
+
 template <class Pmf>
 std::vector<EmitterChoice> LearnedGuide::most_probable(size_t most, const Pmf& pmf) const {
     std::vector<EmitterChoice> choices;

@@ -422,7 +422,8 @@ private:
                                        pilot_seed(settings_.seed, PilotUse::Choice, number_++),
                                        settings_.threads);
             if (drop_.load()) throw PassDropped();
-            if (learned.is_kept_by_auto()) return std::make_shared<const Guide>(learned.guide());
+            if (learned.is_kept_by_auto())
+                return std::make_shared<const Guide>(learned.guide_of_auto());
         } catch (const NothingToLearn&) {
         }
         return nullptr;

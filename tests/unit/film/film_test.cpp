@@ -1,6 +1,7 @@
 #include "film/film.h"
 
 #include <cmath>
+#include <ctime>
 #include <limits>
 #include <memory>
 #include <random>
@@ -10,6 +11,7 @@
 
 #include "film/thread_arena.h"
 #include "math/statistics.h"
+#include "system/section_file.h"
 #include "thread_ranks.h"
 
 namespace etendue {
@@ -424,6 +426,35 @@ TEST(Film, TotalsDoNotDependOnTheThreads) {
         EXPECT_TRUE(one.error.valid);
         for (const int threads : {2, 7}) one.expect_same_bits(totals(threads));
     }
+}
+
+/// Python asks for the error after each pass.
+TEST(Film, TimeOfErrorsDoesNotGrowWithThePasses) {
+    constexpr FilmGeometry kPixel{1, 1, 0, 0, 1, 1};
+    Film film(kPixel, ReconstructionFilter::box());
+    std::mt19937 random(1);
+    std::exponential_distribution<float> value(1);
+    const auto seconds_after = [&](uint64_t passes) {
+        while (film.passes() < passes) {
+            film.begin_pass(0);
+            film.add_eye(0, Rgb(value(random)));
+            film.end_pass();
+        }
+        const std::clock_t begin = std::clock();
+        for (int i = 0; i < 10000; ++i) EXPECT_TRUE(film.error().valid);
+        return double(std::clock() - begin) / CLOCKS_PER_SEC;
+    };
+    const double early = seconds_after(1000), late = seconds_after(100000);
+    EXPECT_LT(late, 10 * early + 0.01);
+    // The same as that of a film which is read, whose sums are made anew.
+    SectionWriter to;
+    film.save(to);
+    Film read(kPixel, ReconstructionFilter::box());
+    SectionReader from(to.take(), "film");
+    read.load(from);
+    EXPECT_EQ(read.error().low, film.error().low);
+    EXPECT_EQ(read.error().high, film.error().high);
+    EXPECT_EQ(read.error().relative_rms, film.error().relative_rms);
 }
 
 /// The largest passes are those of the differences of the totals, for any number of threads.

@@ -1,5 +1,7 @@
 #include "film/splat_buffer.h"
 
+#include <malloc.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -37,6 +39,26 @@ TEST(SplatBuffer, AddsToWhatIsThereAndIsEmptyAfterwards) {
     EXPECT_EQ(sums[0].r, 1);
     EXPECT_EQ(sums[2].b, 1);
     EXPECT_EQ(folded(buffer, 3), std::vector<float>(3));
+}
+
+/// Large splats and sums need memory where they are.
+TEST(SplatBuffer, NeedsLittleMemoryForAFewLargeSplats) {
+    constexpr int kSize = 2048;
+    const auto allocated = [] {
+        const auto about = mallinfo2();
+        return about.uordblks + about.hblkhd;
+    };
+    SplatBuffer buffer(kSize, kSize, 1);
+    std::vector<Rgb> row(kSize);
+    const size_t before = allocated();
+    buffer.add(700, 900, Rgb(1e20f), {{1}}, {{1}});
+    buffer.add(700, 901, Rgb(1e4f), {{1}}, {{1}});
+    EXPECT_LT(allocated() - before, 16 * SplatBuffer::kBytesOfLargeSplats);
+    buffer.fold_into(900 * kSize, row);
+    EXPECT_EQ(row[700].g, 1e20f);
+    EXPECT_EQ(row[701].g, 0);
+    buffer.clear();
+    EXPECT_LE(allocated(), before);
 }
 
 TEST(SplatBuffer, RoundsToTheNearestUnit) {

@@ -18,10 +18,11 @@
 namespace etendue::test {
 namespace {
 
-Scene small_scene(int width = 8) {
+Scene small_scene(int width = 8, const std::string& filter = "box") {
     BuildOptions options;
     options.resolution = {width, width};
-    return build_scene(parse_mitsuba_xml("<scene version=\"3.0.0\">" + front_camera(8) + room() +
+    return build_scene(parse_mitsuba_xml("<scene version=\"3.0.0\">" +
+                                             with_filter(front_camera(8), filter) + room() +
                                              area_lamp() + "</scene>",
                                          "test.xml"),
                        options);
@@ -65,12 +66,15 @@ TEST(RenderLimits, FilmsNeedNoMoreThanTheySay) {
     if (!kCanLimitMemory) GTEST_SKIP() << "sanitizers need the address space";
     constexpr int kSize = 1024;
     constexpr uint64_t kRest = uint64_t(24) << 20;
-    const Scene scene = small_scene(kSize);
+    const Scene box = small_scene(kSize), wide = small_scene(kSize, "gaussian");
     const std::string file = ::testing::TempDir() + "etendue-limits.exr";
-    for (const char* name : {"path", "light"}) {
+    for (const char* name : {"path", "light", "path of a wide filter"}) {
         SCOPED_TRACE(name);
+        const bool is_wide = std::string(name).ends_with("filter");
+        const Scene& scene = is_wide ? wide : box;
         RenderSettings settings;
-        settings.integrator = IntegratorSpec::parse(std::string(name) + ":max_depth=2");
+        settings.integrator =
+            IntegratorSpec::parse((is_wide ? "path" : std::string(name)) + ":max_depth=2");
         settings.threads = 1;
         const bool has_splats = std::string(name) == "light";
         const uint64_t bytes = Film::bytes_per_pixel(has_splats, 0) * kSize * kSize + kRest;
