@@ -34,4 +34,5 @@ def warn_if_busy(machine, who):
 def sentence(machine):
     """For the manual."""
     load = f", under a load of {machine['load']:.1f}" if machine["load"] > BUSY else ""
-    return (f"{machine['date']}, commit {machine['commit']}, {machine['cores']} cores ({machine['processor']}){load}")
+    cores = "one core" if machine["cores"] == 1 else f"{machine['cores']} cores"
+    return f"{machine['date']}, commit {machine['commit']}, {cores} ({machine['processor']}){load}"

@@ -114,16 +114,16 @@ void SplatBuffer::add_large(const Cells& cells, const double* units, size_t pixe
 }
 
 void SplatBuffer::add(size_t digit, const Cells& cell, int64_t n) {
-    int64_t* sum = &lowest_[cell.lowest];
-    if (digit > 0) {
-        auto& higher = cell.tile.higher[digit - 1];
-        if (!higher) higher = std::make_unique<int64_t[]>(kTileCells);
-        sum = &higher[cell.higher];
-    }
-    *sum += n;
-    if (*sum<kFull&& * sum> - kFull) return;
-    const int64_t carried = *sum >> kDigitBits;
-    *sum -= carried << kDigitBits;
+    const auto higher = [&]() -> int64_t& {
+        auto& cells = cell.tile.higher[digit - 1];
+        if (!cells) cells = std::make_unique<int64_t[]>(kTileCells);
+        return cells[cell.higher];
+    };
+    int64_t& sum = digit == 0 ? lowest_[cell.lowest] : higher();
+    sum += n;
+    if (sum < kFull && sum > -kFull) return;
+    const int64_t carried = sum >> kDigitBits;
+    sum -= carried << kDigitBits;
     add(digit + 1, cell, carried);
 }
 

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "film/splat_buffer.h"
 #include "lit_room.h"
 #include "no_memory.h"
 #include "render/renderer.h"
@@ -383,7 +384,7 @@ protected:
 TEST_P(DropSplats, WhereThereIsNoMemoryForOne) {
     std::optional<NoMemoryFor> missing;
     hooks.trace = [&](uint32_t pass) {
-        if (pass == 0) missing.emplace(3 * sizeof(int64_t) * scene.film().pixel_count());
+        if (pass == 0) missing.emplace(SplatBuffer::kBytesOfLargeSplats);
     };
     Renderer r = renderer();
     EXPECT_THROW(run(r), std::bad_alloc);
