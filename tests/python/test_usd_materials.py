@@ -301,7 +301,7 @@ def test_textures_of_layers(tmp_path: Path, capfd: pytest.CaptureFixture[str], m
     inputs = f"float inputs:{coat} = 1\nfloat inputs:{cloth} = 1\n" + "".join(
         f"{'color3f' if n.endswith('color') else 'float'} inputs:{n}.connect = </Paint/Image.outputs:{'rgb' if n.endswith('color') else 'r'}>\n"
         for n in (*names, rough))
-    p = surface(tmp_path, inputs, texture(), **model)
+    p = surface(tmp_path, inputs, texture('token inputs:sourceColorSpace = "raw"'), **model)
     assert [p[n]["type"] for n in ("coat_color", "coat_roughness", "fuzz_color", "fuzz_roughness", "base_diffuse_roughness")] == ["bitmap"] * 5
     assert p["coat_roughness"]["channel"] == "r" and p["coat_roughness"]["raw"] is True and "channel" not in p["coat_color"]
     assert "no effect" not in "".join(capfd.readouterr())
