@@ -100,6 +100,12 @@ std::vector<Planted> planted() {
         lamps += sphere(at, "0.15",
                         diffuse("0.5,0.5,0.5") + "<emitter type=\"area\"><rgb name=\"radiance\" "
                                                  "value=\"3,3,3\"/></emitter>");
+    // Lamps that eye paths hit often.
+    const std::string large_lamps =
+        softly_lit +
+        sphere("0,-0.6,0.2", "0.35",
+               diffuse("0.5,0.5,0.5") + "<emitter type=\"area\"><rgb "
+                                        "name=\"radiance\" value=\"2,2,2\"/></emitter>");
     // A caustic of a glass ball on the floor, from a lamp that eye paths hit often enough.
     const std::string by_glass = softly_lit + sphere("0,-0.2,0.1", "0.45", kGlass);
     const std::string lantern = lantern_room(front_camera(kSize));
@@ -144,8 +150,9 @@ std::vector<Planted> planted() {
         {"EmissionNotInHits", front_camera(kSize) + room() + lamp_in_smooth_glass(),
          "bdpt:roulette=0,guide=random", Lengths, 0},
         {"EmissionPmfNotInNextEvent", lamps, "bdpt:roulette=0,guide=random", Lengths, 0},
-        {"SelectionNotInNextEvents", lamps, "bdpt:roulette=0,guide=random", Image | Lengths, 0},
-        {"SelectionNotInHits", lamps, "bdpt:roulette=0,guide=random", Lengths, 0},
+        {"SelectionNotInNextEvents", lamps, "bdpt:roulette=0,guide=random", Lengths | Techniques,
+         0},
+        {"SelectionNotInHits", large_lamps, "path:guide=random", Image, 0, 256},
         {"UniformPointsOfSpheresInHits", lamps, "path", Lengths, 0},
         {"SelectionNotInRatio", lamps, "bdpt:roulette=0,guide=random", Lengths, 0},
         {"CachedGuideLost", lit_room, "vcm:merges=false,roulette=0,guide=random", Lengths, 0},
