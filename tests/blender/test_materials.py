@@ -108,7 +108,7 @@ def test_textures_of_layers_are_those_of_their_texels(studio, name, capfd):
     picture.pixels = color * 4
     node.inputs[name].default_value = color if isinstance(value, tuple) else value
     studio.sphere(material)
-    lit(studio, "world")
+    lit(studio, "sun")
     constant = studio.render().mean(axis=(0, 1))
     texture = tree.nodes.new("ShaderNodeTexImage")
     texture.image = picture
