@@ -4,9 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include <cstring>
-
 #include "math/hash.h"
+#include "state.h"
 
 namespace etendue::test {
 namespace {
@@ -108,38 +107,9 @@ TEST(LightSelection, LeavesOutWhatIsNotPositiveAndFinite) {
     EXPECT_TRUE(LightSelections({}, uniform()).is_empty());
 }
 
-/// As LearnedState, which belongs to a higher layer.
-struct Bytes {
-    std::vector<std::byte> bytes{};
-    size_t at = 0;
-
-    template <class T>
-    void put(const T& value) {
-        const auto* from = reinterpret_cast<const std::byte*>(&value);
-        bytes.insert(bytes.end(), from, from + sizeof(T));
-    }
-    template <class T>
-    void put(const std::vector<T>& values) {
-        put(values.size());
-        for (const T& v : values) put(v);
-    }
-    template <class T>
-    void get(T& value) {
-        std::memcpy(&value, bytes.data() + at, sizeof(T));
-        at += sizeof(T);
-    }
-    template <class T>
-    void get(std::vector<T>& values) {
-        size_t size = 0;
-        get(size);
-        values.resize(size);
-        for (T& v : values) get(v);
-    }
-};
-
 TEST(LightSelection, IsKept) {
     const LightSelections before(two_lamps(10), uniform());
-    Bytes state;
+    State state;
     before.save(state);
     LightSelections after;
     after.load(state);

@@ -1,5 +1,3 @@
-#include <cstring>
-
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
@@ -7,6 +5,7 @@
 #include "math/frame.h"
 #include "math/warp.h"
 #include "random.h"
+#include "state.h"
 
 namespace etendue {
 namespace {
@@ -273,35 +272,6 @@ TEST(GuideTree, LearnsContributionsByPlaceSideAndMode) {
     EXPECT_LT(tree.cell({}).field(kEye).contribution[kAbove].beyond, 0) << "too few records";
 }
 
-/// Writes and reads as LearnedState does.
-struct State {
-    std::vector<std::byte> bytes;
-    size_t at = 0;
-
-    template <class T>
-    void put(const T& value) {
-        const auto* from = reinterpret_cast<const std::byte*>(&value);
-        bytes.insert(bytes.end(), from, from + sizeof(T));
-    }
-    template <class T>
-    void put(const std::vector<T>& values) {
-        put(values.size());
-        for (const T& v : values) put(v);
-    }
-    template <class T>
-    void get(T& value) {
-        std::memcpy(&value, &bytes[at], sizeof(T));
-        at += sizeof(T);
-    }
-    template <class T>
-    void get(std::vector<T>& values) {
-        size_t size = 0;
-        get(size);
-        values.resize(size);
-        for (T& v : values) get(v);
-    }
-};
-
 /// Densities of many directions at many places.
 std::vector<float> densities(const GuideTree& tree) {
     Random random(21);
@@ -321,7 +291,7 @@ std::vector<float> densities(const GuideTree& tree) {
 
 TEST(GuideTree, IsSavedAndLoaded) {
     const GuideTree tree(samples_under_lamp(20000), 1);
-    State state;
+    test::State state;
     tree.save(state);
     GuideTree loaded;
     loaded.load(state);
