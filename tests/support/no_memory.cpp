@@ -17,7 +17,11 @@ void* operator new(size_t size) {
     if (void* p = std::malloc(size > 0 ? size : 1)) return p;
     throw std::bad_alloc();
 }
-// Also this one, as of std::stable_sort: sanitizers compare how a block was obtained and given back.
+// The other forms, by these. Without them the standard library does so, but sanitizers, which compare how a block was obtained and
+// given back, bring their own.
+void* operator new[](size_t size) {
+    return operator new(size);
+}
 void* operator new(size_t size, const std::nothrow_t&) noexcept {
     return std::malloc(size > 0 ? size : 1);
 }
@@ -25,5 +29,11 @@ void operator delete(void* p) noexcept {
     std::free(p);
 }
 void operator delete(void* p, size_t) noexcept {
+    std::free(p);
+}
+void operator delete[](void* p) noexcept {
+    std::free(p);
+}
+void operator delete[](void* p, size_t) noexcept {
     std::free(p);
 }
