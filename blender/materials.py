@@ -44,8 +44,19 @@ def read_material(material: Any, images: ImageFiles, report: Report) -> Material
         surface = read_shader(output.input("Surface"), values) if output else BLACK
     if len(values.uv_maps) > 1:
         report.warn(values.where, f'only the UV map "{values.uv_maps[0]}" is used beside the active one')
-    emission = None if is_black(surface.emission) else parameter(surface.emission)
+    emission = parameter(surface.emission) if _is_bright(surface.emission) else None
     return Material(surface.masked(), emission, values.uv_maps, values.color_attribute)
+
+
+def _is_bright(value: Any) -> bool:
+    """Whether a value, or a parameter, is not zero everywhere."""
+    if not is_texture(value):
+        return not is_black(value)
+    if value["type"] == "rgb":
+        return any(value["value"])
+    if value["type"] == "scale":
+        return _is_bright(value["value"]) and _is_bright(value["scale"])
+    return value["type"] != "mix" or _is_bright(value["value0"]) or _is_bright(value["value1"])
 
 
 def read_shader(i: Input, values: Values) -> Surface:

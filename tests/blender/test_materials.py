@@ -63,6 +63,15 @@ def lit(studio, light):
         studio.light("SUN", energy=3, angle=0, at={"sun": (1, -1, 3), "back": (0, 3, 1.5)}[light])
 
 
+def read(studio, material, report=None):
+    """What the add-on makes of a material."""
+    from etendue_addon.images import ImageFiles
+    from etendue_addon.materials import read_material
+    from etendue_addon.report import Report
+
+    return read_material(material, ImageFiles(studio.folder), report or Report())
+
+
 @pytest.mark.parametrize("name", NODES)
 def test_nodes_reflect_what_they_do_in_cycles(studio, name):
     kind, inputs, distribution, light, expected = NODES[name]
@@ -179,6 +188,23 @@ def test_names_that_differ_only_in_special_characters(studio):
     image = studio.render()
     left, right = image[20:28, 20:26].mean(axis=(0, 1)), image[20:28, 38:44].mean(axis=(0, 1))
     assert left[0] > 5 * left[2] and right[2] > 5 * right[0]
+
+
+@pytest.mark.parametrize("kind", [PRINCIPLED, "ShaderNodeEmission", "ShaderNodeMixShader"])
+def test_textures_that_emit_nothing_are_no_emitters(studio, kind):
+    material, tree, node = studio.material(kind)
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image = studio.image(lambda u, v: (u, v, 0.5))
+    if kind == "ShaderNodeMixShader":
+        tree.links.new(texture.outputs["Color"], node.inputs[0])
+        for i, color in ((1, COLOR), (2, WHITE)):
+            part = tree.nodes.new("ShaderNodeBsdfDiffuse")
+            part.inputs["Color"].default_value = (*color, 1)
+            tree.links.new(part.outputs[0], node.inputs[i])
+    else:
+        tree.links.new(texture.outputs["Color"], node.inputs["Emission Color" if kind == PRINCIPLED else "Color"])
+        node.inputs["Emission Strength" if kind == PRINCIPLED else "Strength"].default_value = 0
+    assert read(studio, material).emission is None
 
 
 POWERS = [("POWER", 0.0, -1.0), ("POWER", -0.5, 2.0), ("POWER", -0.5, 0.5), ("POWER", 1e30, 9.0), ("DIVIDE", 1.0, 0.0)]

@@ -350,6 +350,25 @@ def test_colours_above_1_are_clamped(tmp_path: Path) -> None:
     assert opaque["/Quad.bsdf"]["type"] == "twosided"
 
 
+PRODUCT = """def Shader "Product" { uniform token info:id = "ND_multiply_color3"
+    color3f inputs:in1.connect = </Paint/Image.outputs:rgb>
+    color3f inputs:in2 = (0, 0, 0)
+    color3f outputs:out }"""
+
+
+@pytest.mark.parametrize("strength, scale, node", [(0, 1, "Image.outputs:rgb"), (1, 0, "Image.outputs:rgb"), (1, 1, "Product.outputs:out")])
+@pytest.mark.parametrize("model, name", [(STANDARD, "emission"), (OPEN_PBR, "emission_luminance")])
+def test_textures_that_emit_nothing_are_no_lights(tmp_path: Path, model: dict[str, str], name: str, strength: int, scale: int,
+                                                  node: str) -> None:
+    """Such a stage is seen in the white environment of those without lights."""
+    png(tmp_path / "four.png", FOUR)
+    inputs = f"color3f inputs:emission_color.connect = </Paint/{node}>\nfloat inputs:{name} = {strength}"
+    nodes = texture(f"float4 inputs:scale = ({scale}, {scale}, {scale}, 1)", more=PRODUCT)
+    with pytest.warns(UserWarning, match="there is no light: a white environment is added"):
+        d = et.load(write(tmp_path, CAMERA + material(inputs, nodes, **model)))
+    assert "emitter" not in d["/Quad"] and image(d).mean() > 0.1
+
+
 def test_nodes_of_materialx(tmp_path: Path) -> None:
     png(tmp_path / "four.png", FOUR)
     nodes = """def Shader "Image" { uniform token info:id = "ND_tiledimage_color3"

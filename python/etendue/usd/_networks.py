@@ -31,6 +31,17 @@ def luminance(color: Any) -> Any:
     return color
 
 
+def is_black(value: Any) -> bool:
+    """Whether a number, colour or texture is zero everywhere."""
+    if not isinstance(value, dict):
+        return bool(value == 0)
+    if value["type"] == "rgb":
+        return not any(value["value"])
+    if value["type"] == "scale":
+        return is_black(value["value"]) or is_black(value["scale"])
+    return value["type"] == "mix" and is_black(value["value0"]) and is_black(value["value1"])
+
+
 def bounded(color: Any) -> Any:
     """A constant colour within [0, 1], as what uses it clamps textures."""
     return rgb([min(max(x, 0.0), 1.0) for x in color["value"]]) if color["type"] == "rgb" else color

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ._context import rgb
-from ._networks import Inputs, bounded, luminance, product
+from ._networks import Inputs, bounded, is_black, luminance, product
 
 Parameters = dict[str, Any]
 
@@ -28,7 +28,7 @@ class Model:
 def _emission(color: Any, strength: float) -> Any:
     """The radiance, None if it is black."""
     emitted = product(color, strength)
-    return None if luminance(emitted) == 0 else emitted
+    return None if is_black(emitted) else emitted
 
 
 def _ior(value: float) -> float:
