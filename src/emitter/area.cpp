@@ -1,7 +1,8 @@
 // Area emitter: radiance L_e from the front of a shape, or from both sides, the same in all directions. Sampling
 // chooses a primitive with probability proportional to area times mean radiance, a point uniform in area, and a
-// direction with density cos θ / π, or |cos θ| / 2π. Next events take a point that Shape::sample_seen() chooses for the observer. Where the shape is masked, a ray meets it, and sees L_e, with a
-// probability equal to the opacity, so that the light it emits has this factor.
+// direction with density cos θ / π, or |cos θ| / 2π. Next events take a point that Shape::sample_seen() chooses for the
+// observer. Where the shape is masked, a ray meets it, and sees L_e, with a probability equal to the opacity, so that the
+// light it emits has this factor.
 
 #include "emitter/area.h"
 

@@ -387,12 +387,11 @@ ShapeSample Sphere::sample_seen(uint32_t prim, Vec3 from, Vec2 u) const {
 float Sphere::seen_density(uint32_t, Vec3 p, Vec3 ng, Vec3 from) const {
     const auto s = seen(from);
     if (!s) return 1;
-    const Vec3 v = from - p;
-    const float dist2 = length2(v), cosine = dot(ng, v);
+    const Vec3d v = Vec3d(from) - Vec3d(p);
+    const double dist2 = dot(v, v), cosine = dot(Vec3d(ng), v) / std::sqrt(dist2);
     if (!(cosine > 0)) return 0;
     // 1 / (2π (1 - cos θ)) per solid angle, times |cos|/d², times 4πr².
-    return float(2 * double(radius_) * double(radius_) / s->one_minus_cosine) * cosine /
-           (dist2 * std::sqrt(dist2));
+    return float(2 * (sqr(double(radius_)) / dist2) / s->one_minus_cosine * cosine);
 }
 
 bool Sphere::intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const {

@@ -1,6 +1,7 @@
 #pragma once
 // What guides the walks of a pass: learned directions at surfaces and at the start of light paths, and the choice of
-// emitters by light paths and by next events. Frozen in a pass, and a function of earlier random numbers only, so that every pass is unbiased.
+// emitters by light paths and by next events. Frozen in a pass, and a function of earlier random numbers only, so that every
+// pass is unbiased.
 
 #include "guide/light_selection.h"
 #include "guide/tree.h"

@@ -401,7 +401,8 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
     const uint64_t refits =
         (std::bit_width(std::max<uint64_t>(1, passes * pass.pixels / walks_)) - 1) / 3;
     // As many walks would not gain more where a guide gains nothing.
-    const bool is_due = passes == 0 || (guide_->uses_surfaces && refits > refits_);
+    const bool has_gain = guide_ && (guide_->uses_surfaces || !guide_->lights.is_empty()),
+               is_due = passes == 0 || (has_gain && refits > refits_);
     if (!is_due) return;
     const auto begin = Clock::now();
     const uint64_t seed = pilot_seed(pass.seed, PilotUse::Guide, passes);
@@ -474,8 +475,7 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
     auto guide = std::make_unique<Guide>();
     guide->surfaces = GuideTree(
         all.samples, seed, learning_at_surfaces(guided, mode_ == Mode::Footprints), all.left_out);
-    if (guide->surfaces.is_empty()) return guide;
-    guide->surfaces.set_contributions(all.contributions);
+    if (!guide->surfaces.is_empty()) guide->surfaces.set_contributions(all.contributions);
     guide->light_contribution = float(all.light_contribution / double(walks));
     if (mode_ != Mode::Footprints) {
         if (joins_of(guided, 1).next_event > 0) learn_lights(pass.scene, all.emission, *guide);

@@ -97,7 +97,8 @@ void MarkovIntegrator::trace(const PassContext& pass) {
     if (!has_begun_) {
         if (!is_loaded) {
             guiding_.train(pass, pilot_paths_.depth(), GuidedWalks::Both, GuidedLight::Indirect);
-            const TechniqueCounts n = direct_counts(pass.scene, pass.light_paths);
+            set_direct_guide();
+            const TechniqueCounts n = guided_direct_counts(pass.scene, pass.light_paths);
             pilot_ = run_pilot(pass, bidirectional_sample(pass.scene, pilot_paths_),
                                [&](int, const SampleContext& c, Workspace& work) {
                                    add_bdpt_sample(direct_, c, n, work);
@@ -155,6 +156,7 @@ void MarkovIntegrator::load(LearnedState& from) {
     from.get(has_chains);
     if (!has_chains) return;
     guiding_.load(from);
+    set_direct_guide();
     pilot_.emplace();
     pilot_->load(from);
     from.get(loaded_);
@@ -165,13 +167,26 @@ TechniqueCounts MarkovIntegrator::direct_counts(const Scene& scene, uint64_t lig
                                       : TechniqueCounts{.hit = 1, .next_event = 1};
 }
 
+TechniqueCounts MarkovIntegrator::guided_direct_counts(const Scene& scene,
+                                                       uint64_t light_paths) const {
+    TechniqueCounts n = direct_counts(scene, light_paths);
+    if (direct_guide_) n.guide = &*direct_guide_;
+    return n;
+}
+
+void MarkovIntegrator::set_direct_guide() {
+    direct_guide_.reset();
+    const Guide* guide = guiding_.guide();
+    if (guide && !guide->lights.is_empty()) direct_guide_.emplace().lights = guide->lights;
+}
+
 void MarkovIntegrator::trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
                                        RenderStats& stats) const {
-    direct_.trace_eye_paths(c, direct_counts(c[0].scene, c[0].light_paths), z, stats);
+    direct_.trace_eye_paths(c, guided_direct_counts(c[0].scene, c[0].light_paths), z, stats);
 }
 
 void MarkovIntegrator::sample(const SampleContext& c, Workspace& work) const {
-    add_bdpt_joins(direct_, c, direct_counts(c.scene, c.light_paths), work);
+    add_bdpt_joins(direct_, c, guided_direct_counts(c.scene, c.light_paths), work);
 }
 
 std::vector<std::pair<std::string, double>> MarkovIntegrator::figures() const {

@@ -110,6 +110,10 @@ private:
 
     /// The counts for the shorter paths. Eye paths make all of them, unless an emitter has no extent.
     static TechniqueCounts direct_counts(const Scene& scene, uint64_t light_paths);
+    /// The same with the learned selection of emitters.
+    TechniqueCounts guided_direct_counts(const Scene& scene, uint64_t light_paths) const;
+    /// After the guide was trained or loaded.
+    void set_direct_guide();
 
     /// Mutations per pixel and pass, as given or from the pilot.
     double mutations_per_pixel() const;
@@ -117,6 +121,8 @@ private:
     StepWorth worth_;
     Guiding guiding_;  ///< Trained once: all chains and samples have the same guide.
     Bidirectional direct_;
+    std::optional<Guide>
+        direct_guide_;  ///< What direct light takes of the guide: the selection of emitters.
     Bidirectional pilot_paths_;  ///< With Russian roulette, even if the walks of chains have none.
     Bidirectional finding_paths_;  ///< Of samples_of_paths().
     std::unique_ptr<StateSpace> space_;

@@ -139,7 +139,7 @@ void PathBuilder::take(const Join& join, const Flight& flight) {
     // As join_next_event() and join_splat() read them.
     emitter_numbers_ = uint64_t(t) - 1;
     lens_numbers_ = uint64_t(s) + 0x8000u;
-    escaped_to_ = join.emitter;
+    emitter_ = join.emitter;
 }
 
 bool PathBuilder::sample_eye_path(int count) {
@@ -221,8 +221,8 @@ bool PathBuilder::append_emitter_point(const Vertex& from, PathState& y) {
     if (!scene.has_emitters() || !from.is_connectible || from.kind == Vertex::Kind::Sensor)
         return false;
     sampler_.seek(Stream::Connection, emitter_numbers_);
-    const Emitter& emitter =
-        scene.sample_emitter(sampler_.next_1d_fine_if(scene.has_emitter_choice()));
+    const double u = sampler_.next_1d_fine_if(scene.has_emitter_choice());
+    const Emitter& emitter = emitter_ ? *emitter_ : scene.sample_emitter(u);
     DirectSample d;
     if (!emitter.sample_direct(from.p, sampler_.next_2d_fine(), d)) return false;
     Vertex v;
@@ -241,8 +241,8 @@ bool PathBuilder::append_emitter_point(const Vertex& from, PathState& y) {
 bool PathBuilder::append_hit_emitter(const Vertex& hit, PathState& y) {
     const auto& infinite = measure_.scene.infinite_emitters();
     const Emitter* emitter = hit.emitter;
-    if (hit.is_infinite && escaped_to_) {
-        emitter = escaped_to_;
+    if (hit.is_infinite && emitter_) {
+        emitter = emitter_;
     } else if (hit.is_infinite) {
         if (infinite.empty()) return false;
         sampler_.seek(Stream::Connection, emitter_numbers_);

@@ -89,8 +89,9 @@ private:
     Vec2 film_{};
     /// Vertices of Stream::Connection: the numbers for an emitter or a point on it, and for a lens point.
     uint64_t emitter_numbers_ = 0, lens_numbers_ = 1;
-    const Emitter* escaped_to_ =
-        nullptr;  ///< The emitter at infinity of an eye path that left the scene, if it is known.
+    /// That of a sample that is taken, which may have selected it otherwise than paths do; for an eye path that left the scene,
+    /// or a next event.
+    const Emitter* emitter_ = nullptr;
 };
 
 }  // namespace etendue

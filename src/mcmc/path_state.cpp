@@ -36,6 +36,7 @@ PathMeasure::PathMeasure(const Scene& of, const FilmRegion& region, int shortest
 void PathState::append(const Vertex& v) {
     x_.emplace_back().v = v;
     Vertex& added = x_.back().v;
+    added.lights = nullptr;  // Mutations select emitters as everywhere.
     if (added.kind == Vertex::Kind::Surface) {
         arena_.adopt(added.bsdf);
         const Material& material = *added.shape->material;
@@ -318,15 +319,13 @@ void PathState::save(LearnedState& to) const {
     ChainState::save(to);
     to.put(film);
     std::vector<SavedVertex> saved;
-    const auto& emitters = measure_.scene.emitters();
+    const auto none = uint32_t(measure_.scene.emitters().size());
     for (const PathVertex& x : x_) {
-        const auto found = std::find_if(emitters.begin(), emitters.end(),
-                                        [&](const auto& e) { return e.get() == x.v.emitter; });
         SavedVertex& v = saved.emplace_back();
         std::memset(static_cast<void*>(&v), 0, sizeof v);  // no random bytes between the fields
         v.p = x.v.p, v.ng = x.v.ng, v.wo = x.v.wo, v.uv = x.v.uv;
         v.location = x.v.location;
-        v.emitter = uint32_t(found - emitters.begin());
+        v.emitter = x.v.emitter ? x.v.emitter->index : none;
         v.pdf_fwd = x.v.pdf_fwd, v.transmittance = x.transmittance;
         v.medium = x.v.medium, v.kind = x.v.kind, v.is_delta = x.v.is_delta;
         v.is_infinite = x.v.is_infinite, v.has_cosine = x.v.has_cosine, v.event = x.v.event;

@@ -35,15 +35,16 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
     if (e.Le.is_zero()) return {};
 
     // From the split before x_0 outward: next event has its own density of x_0, all others have the emission's.
-    const double p_NE = next_event_pdf(z[last - 1], v, emitter, e) / v.pdf_fwd;
     const double p_L = counts.uses_light_paths()
                            ? double(emission_pmf(counts.guide, emitter)) *
                                  origin_pdf(counts.guide, emitter, v.p, e.pdf_y0) / v.pdf_fwd
                            : 0.0;
     double others = 0;
-    if (const Vertex& prev = z[last - 1]; last >= 2 && !prev.is_delta)
+    if (const Vertex& prev = z[last - 1]; last >= 2 && !prev.is_delta) {
+        const double p_NE = next_event_pdf(prev, v, emitter, e) / v.pdf_fwd;
         others += sqr(counts.next_events(prev.is_fixed_by_film) * p_NE) +
                   sqr(counts.connect_emission * counts.reaching(prev.is_fixed_by_film) * p_L);
+    }
     if (counts.uses_light_paths()) {
         const double rev_prev =
             v.is_infinite

@@ -100,7 +100,9 @@ bool append_surface(const WalkContext& walk, SubPath& path, TransportMode mode, 
             if (guide->guides_surfaces())
                 v.set_guide(*path.cell, mode, walk.counts.uses_light_paths());
         }
-        v.lights = guide->lights_at(v.p, side_normal(v));
+        // Next events are made at eye vertices, and weighed at y_1.
+        if (v.is_connectible && (mode == TransportMode::Radiance || path.size() == 2))
+            v.lights = guide->lights_at(v.p, side_normal(v));
     }
     v.pair_level = walk.learned ? walk.learned->pair_level(v.p) : uint8_t(0);
     v.beta = step.beta;

@@ -76,7 +76,8 @@ Guiding train(const Scene& scene, IntegratorSpec& spec, uint64_t seed, int threa
                        .for_each_chain = {}},
                       depth, walks, light);
     });
-    if (!guiding.guide() || guiding.guide()->surfaces.is_empty())
+    const Guide* guide = guiding.guide();
+    if (!guide || (guide->surfaces.is_empty() && guide->lights.is_empty()))
         throw NothingToLearn(
             fmt::format("{}: a guide has nothing to learn from: {}", scene.file(),
                         scene.has_emitters() ? "no walk met a surface" : "there are no emitters"));
@@ -163,13 +164,14 @@ Guide LearnedGuide::guide_of_auto() const {
 
 template <class Pmf>
 std::vector<EmitterChoice> LearnedGuide::most_probable(size_t most, const Pmf& pmf) const {
+    std::vector<std::pair<float, const Emitter*>> learned;
+    for (const auto& e : scene_.emitters()) learned.push_back({pmf(*e), e.get()});
+    std::stable_sort(learned.begin(), learned.end(),
+                     [](const auto& a, const auto& b) { return a.first > b.first; });
+    learned.resize(std::min(learned.size(), most));
     std::vector<EmitterChoice> choices;
-    for (const auto& e : scene_.emitters())
-        choices.push_back({name_of(scene_, *e), pmf(*e), e->selection_pmf});
-    std::stable_sort(
-        choices.begin(), choices.end(),
-        [](const EmitterChoice& a, const EmitterChoice& b) { return a.learned > b.learned; });
-    choices.resize(std::min(choices.size(), most));
+    for (const auto& [p, e] : learned)
+        choices.push_back({name_of(scene_, *e), p, e->selection_pmf});
     return choices;
 }
 
@@ -181,6 +183,7 @@ std::vector<EmitterChoice> LearnedGuide::emitter_choices(size_t most) const {
 Image LearnedGuide::shares() const {
     const GuideTree& tree = guide().surfaces;
     const auto value = [&](const SubPath& z, size_t layer) -> Rgb {
+        if (tree.is_empty()) return {};
         const GuideCell& cell = tree.cell(z[1].p);
         if (layer == 1) return cell_color(uint64_t(&cell - tree.cells().data()));
         if (!z[1].is_connectible) return {};
@@ -232,19 +235,21 @@ GuidedPlace LearnedGuide::at_pixel(int x, int y) const {
     if (z.size() < 2 || !v.is_connectible)
         throw std::runtime_error(
             fmt::format("no surface that can be guided is seen at pixel {},{}", x, y));
-    const GuideCell& cell = guide().surfaces.cell(v.p);
     place.is_surface = true;
     place.shape = v.shape->name;
     place.p = v.p;
     place.normal = dot(v.ng, v.wo) < 0 ? -v.ng : v.ng;
-    place.cell_center = cell.center;
     place.gloss_class = guide_class(v.gloss);
-    const GuideView view = guide_view(v, cell, v.wo);
-    const auto field = [&](TransportMode mode) -> GuidedPlace::Field {
-        return {guide_share(v, cell, mode), cell.field(mode).mixture, view};
-    };
-    place.eye = field(TransportMode::Radiance);
-    place.light = field(TransportMode::Importance);
+    if (!guide().surfaces.is_empty()) {
+        const GuideCell& cell = guide().surfaces.cell(v.p);
+        const GuideView view = guide_view(v, cell, v.wo);
+        const auto field = [&](TransportMode mode) -> GuidedPlace::Field {
+            return {guide_share(v, cell, mode), cell.field(mode).mixture, view};
+        };
+        place.cell_center = cell.center;
+        place.eye = field(TransportMode::Radiance);
+        place.light = field(TransportMode::Importance);
+    }
     constexpr size_t kMostLights = 5;
     if (const LightSelection* lights = guide().lights_at(v.p, side_normal(v)))
         place.lights = most_probable(

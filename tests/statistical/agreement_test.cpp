@@ -322,6 +322,7 @@ TEST(LearnedGuide, IsUsedInTheLantern) {
     const Scene scene = build(lantern_room(front_camera(kAgreementSize)));
     const LearnedGuide learned(scene, IntegratorSpec::parse("bdpt:guide=on"), 1, 2);
     EXPECT_TRUE(learned.guide().guides_surfaces());
+    EXPECT_FALSE(learned.guide().lights.is_empty());
     EXPECT_GT(LearnedGuide::mean_shares(learned.shares())[0], 0.2);
 }
 

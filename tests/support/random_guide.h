@@ -39,15 +39,20 @@ inline Guide random_guide(Vec3 center, float radius, std::vector<double> emissio
     guide.surfaces = guide.emission = GuideTree(cell);
     for (double& weight : emission) weight *= 0.1 + double(u());
     if (emission.size() > 1) {
-        // On each side of surfaces, some emitters are unknown.
+        // Probabilities of their own in each leaf, on each side of surfaces; some emitters are unknown.
         constexpr float kKnown = 0.7f;
+        constexpr int kPlaces = 100;
         const std::array<Vec3, kSurfaceSides> sides{
             {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}, {}}};
         std::vector<Arrival> arrivals;
-        for (const Vec3 n : sides)
-            for (uint32_t e = 0; e < emission.size(); ++e)
-                if (const float weight = u(); weight < kKnown)
-                    arrivals.push_back({{{}, n, weight}, e});
+        for (int i = 0; i < kPlaces; ++i) {
+            const float x = u(), y = u(), z = u();
+            const Vec3 p = center + Vec3{2 * x - 1, 2 * y - 1, 2 * z - 1} * radius;
+            for (const Vec3 n : sides)
+                for (uint32_t e = 0; e < emission.size(); ++e)
+                    if (const float weight = u(); weight < kKnown)
+                        arrivals.push_back({{p, n, weight}, e});
+        }
         guide.lights = LightSelections(
             std::move(arrivals), std::vector<float>(emission.size(), 1 / float(emission.size())));
         guide.set_emission(std::move(emission));

@@ -91,12 +91,16 @@ inline std::string mixed_room(const std::string& the_sensor) {
            sphere("0.1,0.2,-0.1", "0.2", kGlass);
 }
 
-/// Dark floor and walls about a lamp in a glass ball, which no next event finds: directions of eye walks gain much.
+/// Dark floor and walls about a lamp in a glass ball, which no next event finds: directions of eye walks gain much. Next events
+/// find two weak lamps near the floor: their selection gains, too.
 inline std::string lantern_room(const std::string& the_sensor) {
-    const std::string dark = diffuse("0.2,0.15,0.1");
+    const std::string dark = diffuse("0.2,0.15,0.1"),
+                      weak = "<emitter type=\"area\"><rgb name=\"radiance\" value=\"3,2,1\"/>"
+                             "</emitter>";
     return the_sensor + rectangle("<rotate x=\"1\" angle=\"-90\"/><translate y=\"-1\"/>", dark) +
            rectangle("<translate z=\"-1\"/>", dark) +
            rectangle("<rotate y=\"1\" angle=\"90\"/><translate x=\"-1\"/>", dark) +
+           sphere("-0.75,-0.8,0.5", "0.05", weak) + sphere("0.75,-0.8,0.5", "0.05", weak) +
            sphere("0,-0.1,0", "0.3", kGlass) +
            sphere("0,-0.1,0", "0.12",
                   "<emitter type=\"area\"><rgb name=\"radiance\" value=\"12,11,9\"/></emitter>");

@@ -160,6 +160,31 @@ TEST(AreaEmitter, SpheresAreSampledBySolidAngle) {
     }
 }
 
+/// From the earth to the sun in millimetres and in units beyond, and among atoms.
+TEST(AreaEmitter, SpheresAreSampledBySolidAngleAtAnyScale) {
+    for (const float scale : {1e-18f, 1e-8f, 1.0f, 1e14f, 1e17f}) {
+        const Sphere sphere({2 * scale, 0, scale}, scale, false);
+        const auto emitter = make_area_emitter(sphere, Rgb(1));
+        const Vec3 from{-scale, 0.5f * scale, 0};
+        testing::Random random(8);
+        int lit = 0;
+        for (int i = 0; i < 100; ++i) {
+            DirectSample s;
+            if (!emitter->sample_direct(from, {random.next_1d(), random.next_1d()}, s)) continue;
+            ++lit;
+            const double cosine = -double(dot(s.ng, s.wi)), d2 = sqr(double(s.dist)),
+                         distance2 = 10.25 * sqr(double(scale)),
+                         sine2 = sqr(double(scale)) / distance2,
+                         solid_angle = 2 * M_PI * sine2 / (1 + std::sqrt(1 - sine2));
+            if (cosine < 0.05) continue;
+            ASSERT_GT(s.pdf, 0) << scale;
+            // A density per area overflows or vanishes for the largest and smallest.
+            ASSERT_NEAR(cosine / (d2 * double(s.pdf)) / solid_angle, 1, 1e-3) << scale;
+        }
+        EXPECT_GT(lit, 90) << scale;
+    }
+}
+
 /// By rays that meet the sphere, which know nothing of how it is sampled: ∫ p dA = 1.
 TEST(AreaEmitter, DensityOfSpheresIsOneInTotal) {
     const Sphere sphere({0, 0, 0}, 1, false), inward({0, 0, 0}, 1, true);

@@ -65,13 +65,17 @@ TEST(LightSelection, KnowsNothingOfOtherSides) {
 }
 
 /// Twenty lamps in a row, each with its own part of the floor.
-TEST(LightSelection, KnowsTheLampOfEachPlace) {
+LightSelections row_of_lamps() {
     std::vector<Arrival> arrivals;
     for (uint32_t i = 0; i < 100 * kEmitters; ++i) {
         const float x = to_unit_float(uint32_t(mix64(i))) * float(kEmitters);
         arrivals.push_back({{{x, 0, 0}, kUp, 1}, uint32_t(x)});
     }
-    const LightSelections all(std::move(arrivals), uniform());
+    return {std::move(arrivals), uniform()};
+}
+
+TEST(LightSelection, KnowsTheLampOfEachPlace) {
+    const LightSelections all = row_of_lamps();
     for (uint32_t e = 0; e < kEmitters; ++e)
         EXPECT_GT(all.find({float(e) + 0.5f, 0, 0}, kUp)->pmf(e, 1.0f / kEmitters), 0.3f) << e;
 }
@@ -108,14 +112,17 @@ TEST(LightSelection, LeavesOutWhatIsNotPositiveAndFinite) {
 }
 
 TEST(LightSelection, IsKept) {
-    const LightSelections before(two_lamps(10), uniform());
+    const LightSelections before = row_of_lamps();
     State state;
     before.save(state);
     LightSelections after;
     after.load(state);
     EXPECT_EQ(after.gain(), before.gain());
-    for (uint32_t e = 0; e < kEmitters; ++e)
-        EXPECT_EQ(after.find({}, kUp)->pmf(e, 0.1f), before.find({}, kUp)->pmf(e, 0.1f));
+    for (uint32_t at = 0; at < kEmitters; ++at) {
+        const Vec3 p{float(at) + 0.5f, 0, 0};
+        for (uint32_t e = 0; e < kEmitters; ++e)
+            EXPECT_EQ(after.find(p, kUp)->pmf(e, 0.1f), before.find(p, kUp)->pmf(e, 0.1f));
+    }
     EXPECT_EQ(after.find({}, -kUp), nullptr);
 }
 

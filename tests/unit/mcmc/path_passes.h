@@ -29,8 +29,10 @@ public:
                 .hit_lens = scene_.sensor().has_finite_lens() ? N : 0.0f};
     }
     /// Samples of bidirectional path tracing over the lengths of states, without roulette.
-    WeighedSample samples() const {
-        return {[n = counts()](int, const SampleContext& c, Workspace& work) {
+    WeighedSample samples(const Guide* guide = nullptr) const {
+        TechniqueCounts guided = counts();
+        guided.guide = guide;
+        return {[n = guided](int, const SampleContext& c, Workspace& work) {
                     const auto add = [&](const std::optional<Join>& j) {
                         if (!j || j->technique.vertices() <= kShortest ||
                             j->technique.vertices() > kLongest + 1)
@@ -63,12 +65,12 @@ public:
         return space(mutations, weighted_luminance(TargetMap(scene_.film())), user);
     }
     std::unique_ptr<PathSpace> space(const PathMutations& mutations,
-                                     const PathImportance& importance,
-                                     const UserSteps& user = {}) const {
+                                     const PathImportance& importance, const UserSteps& user = {},
+                                     const Guide* guide = nullptr) const {
         return std::make_unique<PathSpace>(
             PathTarget{measure(), importance, LengthChoice(kShortest, kLongest, {}),
                        TechniqueChoice(scene_, kShortest, 8, {}), user},
-            mutations, counts(), samples());
+            mutations, counts(), samples(guide));
     }
     PassContext pass() const {
         return {.scene = scene_,

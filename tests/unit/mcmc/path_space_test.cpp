@@ -8,6 +8,7 @@
 #include "mcmc/whole_film.h"
 #include "path_passes.h"
 #include "pathspace/path_pdfs.h"
+#include "random_guide.h"
 #include "test_scenes.h"
 
 namespace etendue::test {
@@ -260,6 +261,44 @@ TEST_P(Paths, AreRecalledFromSamples) {
     // Where there are masks, all edges are traced again; by rounding, few of those that leave glass are then blocked.
     EXPECT_LE(lost, has_masks ? found[2] / 100 : 0);
     EXPECT_GT(found[0], hits_emitters(passes.scene()) ? 5 : -1);
+}
+
+/// Samples may select emitters and directions otherwise than paths do.
+TEST_P(Paths, AreRecalledFromGuidedSamples) {
+    const Guide guide = random_guide(passes.scene(), 4, 5);
+    const auto space =
+        passes.space({}, weighted_luminance(TargetMap(passes.scene().film())), {}, &guide);
+    const WeighedSample samples = passes.samples(&guide);
+    const WholeFilm whole(passes.pass());
+    const ChainContext c{whole.sample, passes.work()};
+    const auto state = space->make_state();
+    const auto& x = static_cast<const PathState&>(*state);
+    int compared = 0, lost = 0;
+    for (uint64_t i = 0; i < 500; ++i) {
+        const uint64_t key = hash_combine(8, i);
+        std::vector<Find> finds;
+        space->sample(key, c, finds);
+        std::vector<Join> joins;
+        Sampler sampler(SamplerKind::Independent, key);
+        sampler.start(0, 0);
+        samples.for_each_part(sampler, c, [&](const Join& j, double) { joins.push_back(j); });
+        ASSERT_EQ(joins.size(), finds.size());
+        for (size_t n = 0; n < finds.size(); ++n) {
+            space->recall(finds[n], c, *state);
+            if (!(x.target > 0)) {
+                ++lost;
+                continue;
+            }
+            ++compared;
+            ASSERT_EQ(x.size(), joins[n].technique.vertices());
+            ASSERT_EQ(x[0].v.emitter, joins[n].emitter) << joins[n].technique.s;
+            if (joins[n].technique.s == 1 && !joins[n].to_infinity) {
+                ASSERT_EQ(x[0].v.p, joins[n].b.p);
+            }
+        }
+    }
+    EXPECT_GT(compared, 500);
+    EXPECT_LE(lost, passes.scene().has_masks() ? compared / 100 : 0);
 }
 
 bool has_no_edge_below(const PathState& x, double limit) {

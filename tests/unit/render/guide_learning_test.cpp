@@ -79,6 +79,50 @@ TEST(LearnedLights, AreThoseThatShineOnThePlace) {
     EXPECT_TRUE(learn(scene, "light").guide().lights.is_empty());
 }
 
+/// A floor under twenty spots, each of which shines on its own part: no walk learns a direction.
+std::string floor_under_spots() {
+    std::string scene = test::sensor("0,6,0.1", "0,0,0", kSize, "90") +
+                        test::rectangle("<rotate x=\"1\" angle=\"-90\"/><scale value=\"5\"/>",
+                                        test::diffuse("0.5,0.5,0.5"));
+    for (int i = 0; i < 20; ++i) {
+        const std::string at = std::to_string(i % 5 * 2 - 4) + ",",
+                          z = std::to_string(i / 5 * 2 - 3);
+        scene += "<emitter type=\"spot\"><float name=\"cutoff_angle\" value=\"30\"/><transform "
+                 "name=\"to_world\"><lookat origin=\"" +
+                 at + "1," + z + "\" target=\"" + at + "0," + z +
+                 "\" up=\"1,0,0\"/></transform></emitter>";
+    }
+    return scene;
+}
+
+TEST(LearnedLights, NeedNoDirections) {
+    const Scene scene = test::build(floor_under_spots());
+    const LearnedGuide learned = learn(scene, "path");
+    EXPECT_TRUE(learned.guide().surfaces.is_empty());
+    EXPECT_GT(learned.guide().lights.gain(), 1);
+    const GuidedPlace below = learned.at_pixel(kSize / 2, kSize / 2);
+    ASSERT_FALSE(below.lights.empty());
+    EXPECT_GT(below.lights[0].learned, 0.15f);
+    EXPECT_EQ(LearnedGuide::mean_shares(learned.shares())[0], 0);
+}
+
+/// They are learned from more walks as the image has more samples, whether or not directions gain.
+TEST(LearnedLights, AreLearnedAgain) {
+    const Scene scene = test::build(floor_under_spots());
+    RenderSettings settings;
+    settings.integrator = IntegratorSpec::parse("path:guide=on,guide_walks=3000");
+    settings.threads = 2;
+    const auto gain_after = [&](uint64_t passes) {
+        settings.spp = passes;
+        Renderer r(scene, settings);
+        r.run([](const Progress&) {}, std::atomic<bool>{false});
+        for (const auto& [name, value] : r.integrator().figures())
+            if (name == "guide_gain_lights") return value;
+        return 0.0;
+    };
+    EXPECT_NE(gain_after(1), gain_after(17));
+}
+
 /// Light walks learn the way to what the lens sees, not to the pane before it.
 TEST(LearnedImportance, LeavesOutTheWayToTheLens) {
     const Scene scene = test::build(test::front_camera(kSize) + pane() + test::room() +
