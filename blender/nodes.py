@@ -91,6 +91,13 @@ def surface_output(tree: Any, kind: str) -> Output | None:
     return Output(node, None) if node else None
 
 
+def nodes_of(tree: Any, seen: tuple[Any, ...] = ()) -> list[Any]:
+    """All nodes of a tree, and those inside groups, also of groups within groups."""
+    found = list(tree.nodes)
+    groups = [n.node_tree for n in found if n.bl_idname == "ShaderNodeGroup" and n.node_tree]
+    return found + [n for g in dict.fromkeys(groups) if g not in seen for n in nodes_of(g, (*seen, tree))]
+
+
 def tree_of(owner: Any) -> Any:
     """The node tree of a material or a world; None if its nodes are off, which Blender 5 does not have any more."""
     return owner.node_tree if bpy.app.version >= (5, 0, 0) or owner.use_nodes else None

@@ -20,9 +20,10 @@ from .report import Refused, Report
 from .values import Values
 from .world import read_world
 
-_GEOMETRY = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 _RAYS = ("camera", "diffuse", "glossy", "transmission", "shadow")
-_IGNORED = {"EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE", "LIGHT"}
+_ALSO_MESHES = {"CURVE", "SURFACE", "FONT", "META"}
+"""What Blender's graph has as it is, and again as a mesh."""
+_IGNORED = {*_ALSO_MESHES, "EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE", "LIGHT"}
 
 
 @dataclass
@@ -65,7 +66,10 @@ class SceneReader:
 
     def _read_world(self, world: Any) -> None:
         if world is not None:
-            emitter = read_world(world, Values(f'world "{world.name}"', self._images, self.report))
+            render = self._depsgraph.scene_eval.render
+            threads = render.threads if render.threads_mode == "FIXED" else 0
+            values = Values(f'world "{world.name}"', self._images, self.report)
+            emitter = read_world(world, values, self._depsgraph.scene_eval.frame_current, threads)
             if emitter is not None:
                 self._objects["world"] = emitter
 
@@ -77,12 +81,10 @@ class SceneReader:
             emitter = read_light(thing.data, to_world, values)
             if emitter is not None:
                 self._objects[self._new_name("light-" + plain_name(thing.name))] = emitter
-        elif thing.type in _GEOMETRY:
+        elif thing.type == "MESH":
             self._warn_of_ray_visibility(thing)
-            # The graph makes objects anew for each step, but not their data. Modifiers give an object a mesh of its own,
-            # but leave a curve or text as it was.
-            data = thing.original if thing.type != "MESH" and thing.modifiers else thing.data
-            key = (data.as_pointer(), tuple(s.material.name_full if s.material else "" for s in thing.material_slots))
+            # The graph makes objects anew for each step, but not their data.
+            key = (thing.data.as_pointer(), tuple(s.material.name_full if s.material else "" for s in thing.material_slots))
             if key not in self._geometries:
                 self._geometries[key] = self._read_geometry(thing)
             self._geometries[key].transforms.append(to_world)

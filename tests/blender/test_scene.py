@@ -311,6 +311,25 @@ def test_texts_that_share_their_data_have_modifiers_of_their_own(studio):
     assert_same(studio, 0.05)
 
 
+@pytest.mark.parametrize("kind", ["text", "curve", "surface", "metaball"])
+def test_what_becomes_a_mesh_is_there_once(studio, kind):
+    """Blender's graph has it as what it is, and as a mesh."""
+    {"text": bpy.ops.object.text_add, "curve": bpy.ops.curve.primitive_bezier_circle_add,
+     "surface": bpy.ops.surface.primitive_nurbs_surface_sphere_add, "metaball": bpy.ops.object.metaball_add}[kind]()
+    thing = studio._finish("Thing", diffuse(studio))
+    if kind == "curve":
+        thing.data.dimensions, thing.data.fill_mode = "2D", "BOTH"
+    kinds = [v["type"] for v in description(studio).values() if isinstance(v, dict)]
+    assert kinds.count("mesh") == 1 and "instance" not in kinds
+    if kind == "metaball":  # one surface of both
+        bpy.ops.object.metaball_add(radius=1.5, location=(1.5, 0, 0))
+        bpy.context.active_object.name = "Thing.001"
+        kinds = [v["type"] for v in description(studio).values() if isinstance(v, dict)]
+        assert kinds.count("mesh") == 1
+    lamps(studio)
+    assert studio.ratio() == pytest.approx(1, abs=0.03)
+
+
 def test_materials_of_geometry_nodes(studio):
     tree = bpy.data.node_groups.new("Red", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
