@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 import time
 import traceback
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 from .camera import resolution
 from .denoising import prepare
 from .images import with_copies
-from .report import Refused
+from .report import Refused, Report
 from .scene import SceneReader
 from .settings import changed_parameters, integrator_text
 from .viewport import Viewport
@@ -37,6 +38,8 @@ class EtendueEngine(bpy.types.RenderEngine):
     destination: Path | None = None
     """A folder to which the scene is written instead of being rendered: the operator in export.py sets it, so that the
     scene is evaluated as for a final rendering."""
+    is_for_mitsuba = False
+    """Whether that scene has only what Mitsuba 3 reads."""
 
     def update_render_passes(self, scene: Any = None, renderlayer: Any = None) -> None:
         self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")
@@ -60,18 +63,25 @@ class EtendueEngine(bpy.types.RenderEngine):
         self.update_stats("", "Reading the scene")
         reader, scene = SceneReader(depsgraph, folder), depsgraph.scene
         description = reader.read()
-        if EtendueEngine.destination is not None:
-            import etendue as et
-
-            settings = scene.etendue
-            description["sensor"]["sampler"] = {"type": "independent", "sample_count": settings.samples}
-            description["integrator"] = {"type": settings.integrator, **changed_parameters(settings)}
-            description = with_copies(description, self.destination)
-            et.load_dict(description, folder=self.destination).save(self.destination / "scene.xml")
+        if self.destination is not None:
+            self._write(description, scene, reader.report)
         else:
             self._trace(description, depsgraph)
         for warning in reader.report.warnings:
             self.report({"WARNING"}, f"etendue: {warning}")
+
+    def _write(self, description: dict[str, Any], scene: Any, report: Report) -> None:
+        import etendue as et
+
+        settings = scene.etendue
+        description["sensor"]["sampler"] = {"type": "independent", "sample_count": settings.samples}
+        description["integrator"] = {"type": settings.integrator, **changed_parameters(settings)}
+        description = with_copies(description, self.destination)
+        with warnings.catch_warnings(record=True) as replaced:
+            warnings.simplefilter("always")
+            et.load_dict(description, folder=self.destination).save(self.destination / "scene.xml", mitsuba=self.is_for_mitsuba)
+        for warning in replaced:
+            report.warn("Mitsuba 3" if self.is_for_mitsuba else "scene.xml", str(warning.message))
 
     def _trace(self, description: dict[str, Any], depsgraph: Any) -> None:
         import etendue as et

@@ -6,18 +6,22 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import EnumProperty, StringProperty
 
 from .engine import EtendueEngine
 
 
 class ExportEtendueScene(bpy.types.Operator):
-    """Write the scene as Mitsuba XML with PLY meshes, for the program etendue"""
+    """Write the scene as XML with PLY meshes, for the program etendue or for Mitsuba 3"""
 
     bl_idname = "export_scene.etendue"
     bl_label = "Export etendue scene"
 
     directory: StringProperty(name="Folder", description="Receives scene.xml, meshes and textures", subtype="DIR_PATH")
+    target: EnumProperty(name="For", description="The program that reads the file", default="ETENDUE", items=[
+        ("ETENDUE", "etendue", "The scene that F12 renders; etendue reads it, Mitsuba 3 does not have all of its models"),
+        ("MITSUBA", "Mitsuba 3", "What Mitsuba 3 does not have is replaced, with warnings; etendue reads the file, too"),
+    ])
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         context.window_manager.fileselect_add(self)
@@ -27,7 +31,7 @@ class ExportEtendueScene(bpy.types.Operator):
         folder, scene = Path(bpy.path.abspath(self.directory)), context.scene
         folder.mkdir(parents=True, exist_ok=True)
         previous = scene.render.engine
-        EtendueEngine.destination = folder
+        EtendueEngine.destination, EtendueEngine.is_for_mitsuba = folder, self.target == "MITSUBA"
         scene.render.engine = EtendueEngine.bl_idname
         try:
             bpy.ops.render.render(scene=scene.name)
@@ -35,11 +39,12 @@ class ExportEtendueScene(bpy.types.Operator):
             self.report({"ERROR"}, str(e))
             return {"CANCELLED"}
         finally:
-            EtendueEngine.destination = None
+            EtendueEngine.destination, EtendueEngine.is_for_mitsuba = None, False
             scene.render.engine = previous
         self.report({"INFO"}, f"{folder / 'scene.xml'} is written")
         return {"FINISHED"}
 
 
 def menu(self: Any, context: Any) -> None:
-    self.layout.operator(ExportEtendueScene.bl_idname, text="etendue scene (.xml)")
+    for target, text in (("ETENDUE", "etendue scene (.xml)"), ("MITSUBA", "Mitsuba 3 scene (.xml)")):
+        self.layout.operator(ExportEtendueScene.bl_idname, text=text).target = target

@@ -48,6 +48,11 @@ def luminance(value: float | Color) -> float:
     return 0.2126 * r + 0.7152 * g + 0.0722 * b
 
 
+def _single(values: tuple[float, ...]) -> float | Color:
+    """A tuple of one number as this number."""
+    return values[0] if len(values) == 1 else values
+
+
 def is_black(value: Value) -> bool:
     return not is_texture(value) and not any(as_color(value))
 
@@ -85,9 +90,14 @@ def mixture(weight: Value, a: Value, b: Value) -> Value:
         if not is_texture(a) and not is_texture(b):
             both = tuple(x + weight * (y - x) for x, y in zip(as_color(a), as_color(b)))
             return both[0] if isinstance(a, float) and isinstance(b, float) else both
-    elif not is_texture(a) and as_color(a) == (0, 0, 0) and not is_texture(b) and as_color(b) == (1, 1, 1):
-        return weight
     return {"type": "mix", "weight": weight, "value0": parameter(a), "value1": parameter(b)}
+
+
+def grey(value: Value) -> Value:
+    """A texture of colours as one of their luminances."""
+    if not is_texture(value) or "channel" in value or value.get("name") == "vertex_alpha":
+        return value
+    return {"type": "mix", "weight": value, "value0": 0.0, "value1": 1.0}
 
 
 @dataclass
@@ -108,8 +118,10 @@ class Values:
 
     def color(self, i: Input) -> Value:
         """The value of an input as a colour."""
-        value = self._value(i)
-        return value if is_texture(value) else as_color(value)
+        value, source = self._value(i), i.source()
+        if is_texture(value):
+            return grey(value) if source and source.socket.type == "VALUE" else value
+        return as_color(value)
 
     def number(self, i: Input) -> float | dict[str, Any]:
         """The value of an input as a number; of colours the luminance, in textures too."""
@@ -208,20 +220,26 @@ class Values:
 
     def _ShaderNodeMix(self, node: Output) -> Value | None:
         kind = {"FLOAT": "Float", "RGBA": "Color", "VECTOR": "Vector"}.get(node.node.data_type)
-        if kind is None:
+        if kind is None or kind == "Vector" and node.node.factor_mode != "UNIFORM":
             return None
-        a, b = self._value(node.input(f"A_{kind}")), self._value(node.input(f"B_{kind}"))
-        blend = node.node.blend_type if kind == "Color" else "MIX"
-        return self._blend(blend, self.number(node.input("Factor_Float")), a, b)
+        read = self.number if kind == "Float" else self.color
+        a, b, weight = read(node.input(f"A_{kind}")), read(node.input(f"B_{kind}")), self.number(node.input("Factor_Float"))
+        if not is_texture(weight) and not node.node.clamp_factor and not 0 <= weight <= 1:
+            return None
+        is_color = kind == "Color"
+        return self._blend(node.node.blend_type if is_color else "MIX", weight, a, b, is_color and node.node.clamp_result)
 
     def _ShaderNodeMixRGB(self, node: Output) -> Value | None:
         a, b = self.color(node.input("Color1")), self.color(node.input("Color2"))
-        return self._blend(node.node.blend_type, self.number(node.input("Fac")), a, b)
+        return self._blend(node.node.blend_type, self.number(node.input("Fac")), a, b, node.node.use_clamp)
 
-    def _blend(self, blend: str, weight: Value, a: Value, b: Value) -> Value | None:
+    def _blend(self, blend: str, weight: Value, a: Value, b: Value, clamps: bool) -> Value | None:
         if blend not in ("MIX", "MULTIPLY"):
             return None
-        return mixture(weight, a, product(a, b) if blend == "MULTIPLY" else b)
+        result = mixture(weight, a, product(a, b) if blend == "MULTIPLY" else b)
+        if clamps and is_texture(result) and any(v != bounded(v) for v in (a, b)):
+            return None
+        return bounded(result) if clamps else result
 
     def _ShaderNodeInvert(self, node: Output) -> Value | None:
         value, weight = self._value(node.input("Color")), self.number(node.input("Fac"))
@@ -237,13 +255,16 @@ class Values:
 
     def _ShaderNodeMath(self, node: Output) -> Value | None:
         operation = node.node.operation
-        if operation not in _OPERATIONS or node.node.use_clamp:
+        if operation not in _OPERATIONS:
             return None
         a, b = (self.number(i) for i in node.inputs()[:2])
         if not is_texture(a) and not is_texture(b):
-            return _OPERATIONS[operation](a, b)
+            result = _OPERATIONS[operation](a, b)
+            return bounded(result) if node.node.use_clamp else result
+        if node.node.use_clamp:
+            return None
         if operation == "MULTIPLY":
-            return product(a, b)
+            return product(grey(a), grey(b)) if is_texture(a) and is_texture(b) else product(a, b)
         if operation == "SUBTRACT" and a == 1.0:
             return mixture(b, 1.0, 0.0)
         return None
@@ -265,12 +286,14 @@ class Values:
 
     def _ShaderNodeValToRGB(self, node: Output) -> Value | None:
         weight, ramp = self.number(node.input("Fac")), node.node.color_ramp
+        part = slice(3, 4) if node.socket.name == "Alpha" else slice(3)
         if not is_texture(weight):
-            return tuple(ramp.evaluate(weight))[:3]
+            return _single(tuple(ramp.evaluate(weight))[part])
         ends = ramp.elements
-        if len(ends) != 2 or ramp.interpolation != "LINEAR" or (ends[0].position, ends[1].position) != (0.0, 1.0):
+        if len(ends) != 2 or (ends[0].position, ends[1].position) != (0.0, 1.0) \
+                or (ramp.interpolation, ramp.color_mode) != ("LINEAR", "RGB"):
             return None
-        return mixture(weight, tuple(ends[0].color)[:3], tuple(ends[1].color)[:3])
+        return mixture(weight, *(_single(tuple(end.color)[part]) for end in ends))
 
     def _placement(self, vector: Input) -> tuple[np.ndarray, int] | None:
         """The map from the UV coordinates to those of a texture, and the number of the UV map."""

@@ -197,6 +197,94 @@ def test_exported_scenes_give_the_same_image_in_the_program(studio, tmp_path):
     assert np.abs(again - ours).mean() < 1e-3 * ours.mean()
 
 
+_MITSUBA = """
+import sys, mitsuba as mi, numpy as np
+mi.set_variant("scalar_rgb")
+np.save(sys.argv[2], np.array(mi.render(mi.load_file(sys.argv[1]), spp=64))[..., :3])
+"""
+
+
+BALL = np.s_[14:34, 22:42]  # pixels within the sphere
+
+
+def in_mitsuba(studio, folder):
+    """The image of an exported scene in Mitsuba 3, whose Python is in the environment."""
+    python = os.environ.get("ETENDUE_MITSUBA_PYTHON")
+    if not python:
+        pytest.skip("the Python of Mitsuba 3 is not known (ETENDUE_MITSUBA_PYTHON)")
+    assert bpy.ops.export_scene.etendue(directory=str(folder), target="MITSUBA") == {"FINISHED"}
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+    run = subprocess.run([python, "-c", _MITSUBA, folder / "scene.xml", folder / "image.npy"], env=environment,
+                         capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    return np.load(folder / "image.npy")
+
+
+def test_exports_for_mitsuba_look_the_same_there(studio, tmp_path):
+    """Meshes, instances, textures, all kinds of lights, and models that both programs have."""
+    texture = studio.image(lambda u, v: (u, v, 0.3))
+    for i, (kind, inputs) in enumerate((("ShaderNodeBsdfDiffuse", dict(Color=(0.7, 0.3, 0.2))), ("ShaderNodeBsdfGlass", {}),
+                                        ("ShaderNodeBsdfAnisotropic", dict(Roughness=0.4)), ("ShaderNodeBsdfTranslucent", {}))):
+        material, tree, node = studio.material(kind, f"Ball {i}", **inputs)
+        if hasattr(node, "distribution"):
+            node.distribution = "GGX"
+        first = studio.sphere(material, at=(i - 1.5, 0, 0.4), radius=0.4)
+        studio._add(f"Copy {i}", first.data).location = (i - 1.5, 1.2, 0.4)
+    material, tree, node = studio.material("ShaderNodeBsdfDiffuse", "Ground")
+    image = tree.nodes.new("ShaderNodeTexImage")
+    image.image = texture
+    tree.links.new(image.outputs["Color"], node.inputs["Color"])
+    studio.plane(6, material)
+    studio.sphere(studio.material("ShaderNodeEmission", "Lamp", Strength=8.0)[0], at=(0, 0.5, 2), radius=0.3)
+    for i, kind in enumerate(("SPOT", "AREA", "SUN", "POINT")):
+        studio.light(kind, at=(i - 1.5, -1, 3), energy=1 if kind == "SUN" else 20, name=kind).shadow_soft_size = 0
+    tree, background = studio.world()
+    environment = tree.nodes.new("ShaderNodeTexEnvironment")
+    environment.image = studio.image(lambda u, v: (u, v, 1 - u), 64, 32, is_float=True)
+    tree.links.new(environment.outputs["Color"], background.inputs["Color"])
+    studio.scene.etendue.samples = 64
+    ours = studio.render()
+    theirs = in_mitsuba(studio, tmp_path / "exported")
+    assert theirs.mean(axis=(0, 1)) == pytest.approx(ours.mean(axis=(0, 1)), rel=0.02)
+    blocks = [image.reshape(6, 8, 8, 8, 3).mean(axis=(1, 3)) for image in (theirs, ours)]
+    assert np.abs(blocks[0] - blocks[1]).max() < 0.06 * blocks[1].max()
+
+
+WHITE, COLOR = (1.0, 1.0, 1.0), (0.7, 0.3, 0.2)
+# name: inputs, and the ratio of the image in Mitsuba 3 to ours.
+PRINCIPLED = {
+    "diffuse": (dict(Base_Color=COLOR, Roughness=0.5), 1.04),
+    "metal": (dict(Base_Color=(0.9, 0.6, 0.2), Metallic=1.0, Roughness=0.3), 0.99),
+    "rough metal": (dict(Base_Color=WHITE, Metallic=1.0, Roughness=0.8), 0.56),
+    "glass": (dict(Base_Color=WHITE, Transmission_Weight=1.0, Roughness=0.1), 1.0),
+    "half glass": (dict(Base_Color=WHITE, Transmission_Weight=0.5, Roughness=0.5), 0.74),
+    "coat": (dict(Base_Color=COLOR, Coat_Weight=1.0), 1.05),
+    "sheen": (dict(Base_Color=COLOR, Sheen_Weight=1.0), 0.98),
+}
+
+
+@pytest.mark.parametrize("name", PRINCIPLED)
+def test_principled_materials_become_those_of_mitsuba(studio, tmp_path, capfd, name):
+    """Its `principled` loses or gains energy, as docs/blender.md says."""
+    settings, expected = PRINCIPLED[name]
+    studio.sphere(studio.material("ShaderNodeBsdfPrincipled", "Ball", **settings)[0], at=(0, 0, 0), radius=1.2)
+    studio.world()
+    ours = studio.render()
+    capfd.readouterr()
+    theirs = in_mitsuba(studio, tmp_path / "exported")
+    assert 'bsdf "principled" stands in for it' in "".join(capfd.readouterr())
+    assert theirs[BALL].mean() / ours[BALL].mean() == pytest.approx(expected, abs=0.02)
+
+
+def test_exports_for_etendue_keep_its_models(studio, tmp_path):
+    studio.sphere(studio.material("ShaderNodeBsdfPrincipled", "Ball")[0])
+    for target in ("ETENDUE", "MITSUBA"):
+        folder = tmp_path / target
+        assert bpy.ops.export_scene.etendue(directory=str(folder), target=target) == {"FINISHED"}
+        text = (folder / "scene.xml").read_text()
+        assert ('type="openpbr"' in text) == (target == "ETENDUE") and ('type="principled"' in text) == (target == "MITSUBA")
+
+
 def test_viewports_render_what_the_camera_sees(studio):
     """Without a window there is no drawing; the sensor of a viewport is that of its matrices."""
     from etendue_addon.viewport import _sensor
