@@ -48,8 +48,9 @@ class Viewport:
             self._cancel()
             description = {**self._description, "sensor": _sensor(context)}
             self._run = _Run(self._engine, description, integrator_text(settings), settings.preview_samples)
-        error = self._error or (self._run.error if self._run else "")
-        engine.update_stats("etendue", error)
+        # Blender shows both in a corner of the view.
+        engine.update_stats("etendue", self._error or (self._run.status if self._run else ""))
+        engine.update_progress(self._run.fraction if self._run else 0.0)
         if self._run is not None and self._run.image is not None:
             _draw(engine, context, depsgraph.scene, self._run.image)
 
@@ -70,10 +71,18 @@ class _Run:
         self.image: np.ndarray | None = None
         self.error = ""
         """Why there is no image."""
+        self.fraction = 0.0
+        """The part of the samples that is done."""
+        self._progress = ""
         self._engine = engine
         self._is_stopped = threading.Event()
         self._thread = threading.Thread(target=self._render, args=(description, method, samples), daemon=True)
         self._thread.start()
+
+    @property
+    def status(self) -> str:
+        """Samples and time so far, or the error."""
+        return self.error or self._progress or "Building the scene"
 
     def stop(self) -> None:
         """Ends it, within a pass too."""
@@ -82,7 +91,8 @@ class _Run:
 
     def _render(self, description: dict[str, Any], method: str, samples: int) -> None:
         def show(progress: Any) -> None:
-            self.image = progress.image
+            self.image, self.fraction = progress.image, progress.passes / samples
+            self._progress = f"{progress.passes} of {samples} samples, {progress.seconds:.1f} s"
             self._redraw()
 
         try:
@@ -129,9 +139,13 @@ def _draw(engine: Any, context: Any, scene: Any, image: np.ndarray) -> None:
     from gpu_extras.presets import draw_texture_2d
 
     height, width = image.shape[:2]
-    pixels = np.concatenate([image[::-1], np.ones_like(image[..., :1])], axis=2).astype(np.float32)
-    buffer = gpu.types.Buffer("FLOAT", width * height * 4, np.ascontiguousarray(pixels).reshape(-1))
+    buffer = gpu.types.Buffer("FLOAT", width * height * 4, _pixels(image).reshape(-1))
     texture = gpu.types.GPUTexture((width, height), format="RGBA16F", data=buffer)
     engine.bind_display_space_shader(scene)
     draw_texture_2d(texture, (0, 0), context.region.width, context.region.height)
     engine.unbind_display_space_shader()
+
+
+def _pixels(image: np.ndarray) -> np.ndarray:
+    """RGBA in single precision; the first row is the lowest one."""
+    return np.concatenate([image[::-1], np.ones_like(image[..., :1])], axis=2).astype(np.float32)

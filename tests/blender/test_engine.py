@@ -1,9 +1,11 @@
 """The engine: passes, cancelling, errors, settings; and exported scenes rendered by the program."""
 
 import os
+import re
 import subprocess
 import sys
 import time
+import types
 import weakref
 import zipfile
 from pathlib import Path
@@ -313,13 +315,22 @@ class FakeEngine:
     """What a viewport calls of Blender's engine."""
 
     def __init__(self):
-        self.redraws, self.said = 0, ""
+        self.redraws, self.said, self.fraction, self.shader = 0, "", 0.0, []
 
     def tag_redraw(self):
         self.redraws += 1
 
     def update_stats(self, _, text):
         self.said = text
+
+    def update_progress(self, fraction):
+        self.fraction = fraction
+
+    def bind_display_space_shader(self, scene):
+        self.shader.append(scene.name)
+
+    def unbind_display_space_shader(self):
+        self.shader.append(None)
 
 
 def viewport(studio, monkeypatch, engine):
@@ -362,6 +373,46 @@ def test_viewports_render_until_blender_releases_them(studio, monkeypatch):
     released = weakref.ref(engine)
     del engine
     assert released() is None and not run._thread.is_alive() and not run.error
+
+
+def test_viewports_say_how_far_they_are(studio, monkeypatch):
+    """Samples, time and the fraction; nothing of the last image after a change of the view."""
+    furnished(studio)
+    studio.scene.etendue.preview_samples = 3
+    engine = FakeEngine()
+    view, context = viewport(studio, monkeypatch, engine)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    view.update(context, depsgraph)
+    view.draw(context, depsgraph)
+    assert engine.said == "Building the scene" or re.fullmatch(r"\d of 3 samples, \d+\.\d s", engine.said)
+    wait(lambda: view._run.fraction == 1)
+    view.draw(context, depsgraph)
+    assert re.fullmatch(r"3 of 3 samples, \d+\.\d s", engine.said) and engine.fraction == 1
+    monkeypatch.setattr(et, "load_dict", lambda *_: time.sleep(0.5))
+    context.region.width = 32
+    view.draw(context, depsgraph)
+    assert engine.said == "Building the scene" and engine.fraction == 0 and view._run.image is None
+    view.close()
+
+
+def test_viewports_draw_the_newest_image_over_all_of_the_region(studio, monkeypatch):
+    """Without a window there is no GPU: what the drawing gives to it is looked at instead."""
+    calls = []
+    gpu, presets = types.ModuleType("gpu"), types.ModuleType("gpu_extras.presets")
+    gpu.types = types.SimpleNamespace(
+        Buffer=lambda kind, size, data: calls.append((kind, size, data)) or data,
+        GPUTexture=lambda size, format, data: calls.append((size, format)) or "texture")
+    presets.draw_texture_2d = lambda *args: calls.append(args)
+    monkeypatch.setitem(sys.modules, "gpu", gpu)
+    monkeypatch.setitem(sys.modules, "gpu_extras.presets", presets)
+    engine, region = FakeEngine(), types.SimpleNamespace(width=300, height=200)
+    image = np.arange(18, dtype=np.float64).reshape(2, 3, 3)
+    sys.modules["etendue_addon.viewport"]._draw(engine, types.SimpleNamespace(region=region), studio.scene, image)
+    kind, size, data = calls[0]
+    assert (kind, size, data.dtype, data.shape) == ("FLOAT", 24, np.float32, (24,)) and data.flags.c_contiguous
+    assert data[:8].tolist() == [9, 10, 11, 1, 12, 13, 14, 1] and data[12:16].tolist() == [0, 1, 2, 1]
+    assert calls[1:] == [((3, 2), "RGBA16F"), ("texture", (0, 0), 300, 200)]
+    assert engine.shader == [studio.scene.name, None]
 
 
 def test_the_engines_of_blender_can_be_referred_to_weakly(studio, monkeypatch):
