@@ -2,12 +2,13 @@
 
 #include <map>
 #include <mutex>
+#include <numbers>
 
 namespace etendue {
 namespace {
 
 /// Rows where α varies alone, and where η varies, too.
-constexpr int kAlphaRowsOfSlab = 25, kAlphaRowsBesideEta = 17, kEtaRowsOfSlab = 17, kPhiRows = 9;
+constexpr int kAlphaRowsOfSlab = 25, kAlphaRowsBesideEta = 17, kEtaRowsOfSlab = 17, kPhiRows = 13;
 /// The squares are the numbers of normals per node. Those of glass decide on total reflection as well.
 constexpr int kNormals = 32, kNormalsOfGlass = 48;
 constexpr float kLargestEpsilon = 0.999f;
@@ -136,19 +137,19 @@ void OpenPbrLayers::make_fuzz(Layer& layer, float roughness) const {
 
 /// Facets of one roughness and index.
 struct OpenPbrTable::Facets {
-    int row, n_phi;
+    int row;
+    const std::vector<double>&azimuths, &weights;
     Vec2 alpha;
     float eta;
 
-    int nodes() const { return n_phi * CosineNodes::kNodes; }
+    int nodes() const { return int(azimuths.size()) * CosineNodes::kNodes; }
     float cosine(int node) const { return CosineNodes::cosine(node % CosineNodes::kNodes); }
     Vec3 direction(int node) const {
         const Vec3 w = direction_at(cosine(node));
-        if (n_phi == 1) return w;
-        const float phi = 0.5f * kPi * float(node / CosineNodes::kNodes) / float(n_phi - 1);
+        const auto phi = float(azimuths[size_t(node / CosineNodes::kNodes)]);
         return {w.x * std::cos(phi), w.x * std::sin(phi), w.z};
     }
-    /// 2 ∫ v(μ) μ dμ, the mean over the azimuth by the trapezoidal rule.
+    /// 2 ∫ v(μ) μ dμ, the mean over the azimuth of what is linear between rows.
     template <class F>
     double mean_of(const F& value) const {
         double sum = 0;
@@ -156,11 +157,8 @@ struct OpenPbrTable::Facets {
         return sum;
     }
     double weight(int node) const {
-        const int p = node / CosineNodes::kNodes;
-        const double share = n_phi == 1                 ? 1.0
-                             : p == 0 || p == n_phi - 1 ? 0.5 / (n_phi - 1)
-                                                        : 1.0 / (n_phi - 1);
-        return share * CosineNodes::weights()[size_t(node % CosineNodes::kNodes)];
+        return weights[size_t(node / CosineNodes::kNodes)] *
+               CosineNodes::weights()[size_t(node % CosineNodes::kNodes)];
     }
     double mean(const std::vector<float>& v) const {
         return mean_of([&](int j) { return v[size_t(j)]; });
@@ -240,6 +238,7 @@ OpenPbrTable::OpenPbrTable(OpenPbrSlab slab, const OpenPbrConstants& constants)
       n_blocks_(constants.has_coat || constants.has_fuzz
                     ? std::max(layers_.coat_blocks(), 1) * std::max(layers_.fuzz_blocks(), 1)
                     : 0) {
+    if (n_phi_ > 1) make_azimuths();
     const auto rows = size_t(n_alpha_ * n_eta_);
     for (auto& v : values_) v.resize(rows * size_t(n_phi_) * kNodes);
     for (auto& m : means_) m.resize(rows);
@@ -263,8 +262,30 @@ OpenPbrTable::OpenPbrTable(OpenPbrSlab slab, const OpenPbrConstants& constants)
         }
 }
 
+void OpenPbrTable::make_azimuths() {
+    constexpr float kLeastAspect = 1e-4f;
+    stretch_ = std::sqrt(clamp(layers_.constants().aspect, kLeastAspect, 1 / kLeastAspect));
+    const double quarter = 0.5 * std::numbers::pi;
+    const auto azimuth = [&](double row) {
+        const double x = row / (n_phi_ - 1);
+        return x < 1 ? std::atan(std::tan(quarter * x) / double(stretch_)) : quarter;
+    };
+    azimuths_.resize(size_t(n_phi_));
+    azimuth_weights_.assign(size_t(n_phi_), 0);
+    constexpr int kSteps = 256;
+    for (int row = 0; row < n_phi_; ++row) azimuths_[size_t(row)] = azimuth(row);
+    for (int row = 0; row + 1 < n_phi_; ++row)
+        for (int i = 0; i < kSteps; ++i) {
+            const double f = (i + 0.5) / kSteps, share = (azimuth(row + double(i + 1) / kSteps) -
+                                                          azimuth(row + double(i) / kSteps)) /
+                                                         quarter;
+            azimuth_weights_[size_t(row)] += (1 - f) * share;
+            azimuth_weights_[size_t(row) + 1] += f * share;
+        }
+}
+
 void OpenPbrTable::make_row(int row, float alpha, float eta) {
-    const Facets facets{row, n_phi_, layers_.constants().alphas(alpha), eta};
+    const Facets facets{row, azimuths_, azimuth_weights_, layers_.constants().alphas(alpha), eta};
     switch (slab_) {
     case OpenPbrSlab::Opaque: make_opaque(facets); break;
     case OpenPbrSlab::Glass: make_glass(facets); break;

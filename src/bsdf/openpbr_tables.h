@@ -214,8 +214,8 @@ public:
     Row row(Row mean, Vec3 w) const {
         if (n_phi_ == 1) return mean;
         Row r = mean;
-        const float x =
-            std::atan2(std::fabs(w.y), std::fabs(w.x)) * (2 * kInvPi) * float(n_phi_ - 1);
+        const float x = std::atan2(std::fabs(stretch_ * w.y), std::fabs(w.x)) * (2 * kInvPi) *
+                        float(n_phi_ - 1);
         const int i = std::min(int(x), n_phi_ - 2);
         r.first = mean.first * n_phi_ + i;
         r.f_phi = x - float(i);
@@ -294,6 +294,7 @@ private:
     /// One combination of roughness and index: a node for each cosine and azimuth, in this order.
     struct Facets;
     class Takings;
+    void make_azimuths();
     void make_row(int row, float alpha, float eta);
     void make_opaque(const Facets& facets);
     void make_glass(const Facets& facets);
@@ -308,6 +309,10 @@ private:
     OpenPbrSlab slab_;
     OpenPbrLayers layers_;
     int n_alpha_, n_eta_, n_phi_, n_blocks_;
+    /// Rows are equidistant in atan(stretch tan φ), halfway to the space where the facets are round: albedos are nearly linear there.
+    float stretch_ = 1;
+    /// The azimuths of the rows, and shares of these in means.
+    std::vector<double> azimuths_{0}, azimuth_weights_{1};
     bool is_one_row_ = n_alpha_ * n_eta_ * n_phi_ == 1;
     std::array<std::vector<float>, kPlanes> values_, means_;
     std::array<std::vector<Vec3>, 2> taken_, mean_taken_;  ///< By the Side; block, row, node.
