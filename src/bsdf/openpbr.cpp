@@ -7,12 +7,14 @@
 //                                       specular_ior
 //   specular_color (1)                  factor of the dielectric's reflection; of metal, that at 82°
 //   specular_roughness (0.3)            square root of α; below 0.01 the surface is smooth
-//   specular_roughness_anisotropy (0)   stretches highlights along ∂p/∂u; a number
+//   specular_roughness_anisotropy (0)   stretches highlights along ∂p/∂u, or ∂p/∂v where it is negative; a number
 //   specular_ior (1.5)                  index below over index above; a number
 //   transmission_weight (0)             share of glass in what is not metal
 //   transmission_color (1)              colour of light that passes two boundaries, each with its square root
 //   coat_weight (0), coat_color (1), coat_roughness (0), coat_ior (1.6)      clear coat over all of these, and its
 //                                       transmittance at normal incidence, down and up; the index is a number
+//   coat_affect_ior (1)                 1: the index below the coat is relative to the coat's; 0: to that above; a number
+//   coat_affect_roughness (1)           1: the coat's roughness blurs what lies below; 0: it does not; a number
 //   fuzz_weight (0), fuzz_color (1), fuzz_roughness (0.5)      fibres over all
 //   thin_walled (false)                 glass is a smooth pane without coat and fuzz; the surface is seen from both sides
 // All of them may be textures, except those that are said to be numbers.
@@ -28,6 +30,8 @@
 //   - Metal has F82-tint [Kutz et al. 2021], the diffuse base f_FON with the multiple scattering of EON
 //     [Portsmouth et al. 2025], fuzz the cloth of [Estevez & Kulla 2017].
 //   - specular_weight does not scale the reflection of metal.
+//   - Glass keeps its index below a coat: light that has passed both boundaries is refracted as without the coat. An index
+//     below 1 stays below 1.
 //   - The coat is isotropic and does not darken its base by reflections between them, and there is no subsurface scattering,
 //     dispersion, thin film or emission.
 // A thin-walled material, and one with transmission, has its opaque part on both sides; other ones reflect on the front alone.
@@ -424,7 +428,18 @@ float OpenPbrLobe::max_pdf(Vec3 wo, const DirectionCone& c) const {
 Rgb OpenPbrLobe::albedo_estimate() const {
     const float F = fresnel_dielectric(1, eta).R;
     const Rgb dielectric = Rgb(tint) * F + color * (1 - F);
-    return is_glass() ? dielectric : lerp(metal, dielectric, color);
+    Rgb albedo = is_glass() ? dielectric : lerp(metal, dielectric, color);
+    const OpenPbrLayers& layers = table->layers();
+    if (coat > 0) {
+        const float E = fresnel_dielectric(1, layers.constants().coat_eta).R;
+        albedo = lerp(coat, albedo, Rgb(E) + Rgb(coat_color) * albedo * (1 - E));
+    }
+    if (fuzz > 0) {
+        const float E =
+            layers.fuzz_albedo(layers.row(coat_roughness, fuzz_roughness), CosineNodes::place(1));
+        albedo = lerp(fuzz * E, albedo, Rgb(fuzz_color));
+    }
+    return albedo;
 }
 
 float OpenPbrLobe::roughness() const {
@@ -455,22 +470,31 @@ public:
           fuzz_color_(context.texture(params, "fuzz_color", Rgb(1), 1)),
           fuzz_roughness_(context.texture(params, "fuzz_roughness", Rgb(0.5f), 1)),
           ior_(params.number("specular_ior", 1.5f, 0.01f, 1e6f)),
+          coat_ior_(params.number("coat_ior", 1.6f, 1, 100)),
+          coat_affect_ior_(params.number("coat_affect_ior", 1, 0, 1)),
+          coat_affect_roughness_(params.number("coat_affect_roughness", 1, 0, 1)),
           is_thin_(params.flag("thin_walled", false)) {
         OpenPbrConstants& c = constants_;
         const Surface at = surface(TexturePoint());
-        c.eta_varies = !specular_weight_.is_constant() || !specular_color_.is_constant();
-        c.eta = c.eta_varies ? (ior_ < 1 ? 0.5f : 2.0f) : at.eta;
+        const auto eta_at = [&](bool varies, float eta) {
+            return varies ? (ior_ < 1 ? 0.5f : 2.0f) : eta;
+        };
+        const bool factor_varies =
+            !specular_weight_.is_constant() || !specular_color_.is_constant();
         c.has_coat = may_be(coat_);
         c.has_fuzz = may_be(fuzz_);
-        c.alpha_varies =
-            !roughness_.is_constant() || (c.has_coat && may_be(coat_roughness_) &&
-                                          !(coat_.is_constant() && coat_roughness_.is_constant()));
+        c.eta_varies = factor_varies || (coat_affect_ior_ > 0 && !coat_.is_constant());
+        c.eta = eta_at(c.eta_varies, at.eta);
+        c.alpha_varies = !roughness_.is_constant() ||
+                         (coat_affect_roughness_ > 0 && c.has_coat && may_be(coat_roughness_) &&
+                          !(coat_.is_constant() && coat_roughness_.is_constant()));
         c.alpha = c.alpha_varies ? 0 : at.alpha;
-        c.aspect = 1 - params.number("specular_roughness_anisotropy", 0, 0, 1);
+        constexpr float kLargestAspect = 1e4f;
+        const float a = params.number("specular_roughness_anisotropy", 0, -1, 1);
+        c.aspect = a < 0 ? 1 / std::max(1 + a, 1 / kLargestAspect) : 1 - a;
         if (c.alpha == 0 && !c.alpha_varies) c.aspect = 1;
-        const float coat_eta = params.number("coat_ior", c.coat_eta, 1, 100);
         if (c.has_coat) {
-            c.coat_eta = coat_eta;
+            c.coat_eta = coat_ior_;
             c.coat_roughness_varies = !coat_roughness_.is_constant();
             if (!c.coat_roughness_varies) c.coat_roughness = at.coat_roughness;
         }
@@ -483,7 +507,8 @@ public:
         c.has_dielectric = !is_one(metalness_);
         OpenPbrConstants opaque = c, glass = c;
         if (!c.has_dielectric) opaque.eta = 1.5f, opaque.eta_varies = false;
-        if (!c.eta_varies) glass.eta = glass_eta(c.eta);
+        glass.eta_varies = factor_varies;
+        glass.eta = eta_at(factor_varies, at.eta_of_glass);
         glass.has_metal = glass.has_dielectric = true;
         opaque_ = SharedOpenPbrTable::of(OpenPbrSlab::Opaque, opaque);
         glass_ = SharedOpenPbrTable::of(OpenPbrSlab::Glass, glass);
@@ -522,7 +547,7 @@ public:
             list.add(reflecting, lobe, weight * (1 - glass));
         }
         if (!(glass > 0)) return;
-        lobe.eta = glass_eta(s.eta);
+        lobe.eta = s.eta_of_glass;
         const Rgb transmitted = transmission_color_.eval(at);
         if (is_thin_)
             return list.add(frame, ThinDielectricLobe{lobe.eta, s.tint, transmitted},
@@ -534,13 +559,12 @@ public:
     bool is_transmissive() const override { return may_be(transmission_); }
     bool is_two_sided() const override { return is_transmissive() || is_thin_; }
     bool may_be_smooth() const override {
-        return !roughness_.is_constant() ||
-               sqr(roughness_.eval_scalar(Vec2())) > Microfacet::kMinAlpha || may_be(coat_) ||
-               may_be(fuzz_) || !(is_one(metalness_) || is_one(transmission_));
+        return constants_.alpha_varies || !has_smooth_facets() || may_be(coat_) || may_be(fuzz_) ||
+               !(is_one(metalness_) || is_one(transmission_));
     }
     bool may_have_delta() const override {
-        return constants_.alpha_varies || constants_.alpha <= Microfacet::kMinAlpha ||
-               may_be(coat_) || (is_thin_ && may_be(transmission_));
+        return constants_.alpha_varies || has_smooth_facets() || may_be(coat_) ||
+               (is_thin_ && may_be(transmission_));
     }
     Rgb mean_albedo() const override {
         const float metal = metalness_.mean().mean(),
@@ -550,6 +574,11 @@ public:
     }
 
 private:
+    /// Where the roughness does not vary.
+    bool has_smooth_facets() const {
+        const Vec2 a = constants_.alphas(constants_.alpha);
+        return std::max(a.x, a.y) <= Microfacet::kMinAlpha;
+    }
     static bool may_be(const TextureRef& t) {
         return !t.is_constant() || t.eval_scalar(Vec2()) > 0;
     }
@@ -564,9 +593,26 @@ private:
         return std::max(eta, kEtaOfClearGlass);
     }
 
+    /// An index whose reflectance at normal incidence is that of `eta` times `factor`, on its side of 1.
+    static float weighted(float eta, float factor) {
+        if (factor == 1) return eta;
+        const float root =
+            std::sqrt(std::min(sqr((eta - 1) / (eta + 1)) * std::max(factor, 0.0f), kLargestR0));
+        return eta < 1 ? (1 - root) / (1 + root) : (1 + root) / (1 - root);
+    }
+    /// Relative to the coat, but on the same side of 1, so that no light is reflected totally.
+    float ior_below_coat() const {
+        const float ratio = ior_ / coat_ior_;
+        return (ratio < 1) == (ior_ < 1) ? ratio : 1 / ratio;
+    }
+    /// (r⁴ + 2 c⁴)^¼, at most 1.
+    static float blurred(float r, float coat_roughness) {
+        return std::sqrt(std::sqrt(std::min(1.0f, sqr(sqr(r)) + 2 * sqr(sqr(coat_roughness)))));
+    }
+
     struct Surface {
         Rgb tint;
-        float eta, alpha;
+        float eta, eta_of_glass, alpha;
         Share16 roughness, coat, coat_roughness;
     };
     /// What the parameters of the facets and of the coat mean.
@@ -577,22 +623,18 @@ private:
         const float most = std::max(color.max(), 1.0f);
         s.tint = color / most;
         const float factor = specular_weight_.eval_scalar(at) * most;
-        s.eta = ior_;
-        if (factor != 1) {
-            const float root = std::sqrt(
-                std::min(sqr((ior_ - 1) / (ior_ + 1)) * std::max(factor, 0.0f), kLargestR0));
-            s.eta = ior_ < 1 ? (1 - root) / (1 + root) : (1 + root) / (1 - root);
-        }
+        s.eta = weighted(ior_, factor);
+        s.eta_of_glass = glass_eta(s.eta);
         float r = roughness_.eval_scalar(at);
         if (may_be(coat_)) {
             const float coat = coat_.eval_scalar(at),
                         coat_roughness = coat_roughness_.eval_scalar(at);
             s.coat = coat, s.coat_roughness = coat_roughness;
+            if (const float share = coat * coat_affect_ior_; share > 0)
+                s.eta = weighted(lerp(share, ior_, ior_below_coat()), factor);
             // The coat blurs what lies below.
-            if (coat > 0 && coat_roughness > 0) {
-                const float below = sqr(sqr(r)) + 2 * sqr(sqr(coat_roughness));
-                r = lerp(coat, r, std::pow(std::min(1.0f, below), 0.25f));
-            }
+            if (const float share = coat * coat_affect_roughness_; share > 0 && coat_roughness > 0)
+                r = lerp(share, r, blurred(r, coat_roughness));
         }
         s.roughness = r;
         s.alpha = sqr(float(s.roughness));
@@ -602,7 +644,7 @@ private:
     TextureRef base_weight_, base_color_, diffuse_roughness_, metalness_, specular_weight_,
         specular_color_, roughness_, transmission_, transmission_color_, coat_, coat_color_,
         coat_roughness_, fuzz_, fuzz_color_, fuzz_roughness_;
-    float ior_;
+    float ior_, coat_ior_, coat_affect_ior_, coat_affect_roughness_;
     bool is_thin_;
     OpenPbrConstants constants_;
     std::shared_ptr<const SharedOpenPbrTable> opaque_, glass_;
@@ -629,7 +671,7 @@ MaterialEntry openpbr_entry() {
           {"specular_roughness", ParamKind::Texture, "0.3",
            "Square root of the facets' alpha, in [0, 1]."},
           {"specular_roughness_anisotropy", ParamKind::Float, "0",
-           "Stretches highlights along the u direction, in [0, 1]."},
+           "Stretches highlights along the u direction, or v where it is negative, in [-1, 1]."},
           {"specular_ior", ParamKind::Float, "1.5",
            "Index of refraction below the surface divided by that above it."},
           {"transmission_weight", ParamKind::Texture, "0",
@@ -641,6 +683,11 @@ MaterialEntry openpbr_entry() {
            "Transmittance of the coat along the normal, down and up, in [0, 1]."},
           {"coat_roughness", ParamKind::Texture, "0", "Roughness of the coat, in [0, 1]."},
           {"coat_ior", ParamKind::Float, "1.6", "Index of refraction of the coat, at least 1."},
+          {"coat_affect_ior", ParamKind::Float, "1",
+           "How far the index below the coat is relative to the coat's, in [0, 1]; glass keeps "
+           "its own."},
+          {"coat_affect_roughness", ParamKind::Float, "1",
+           "How far the coat's roughness blurs what lies below, in [0, 1]."},
           {"fuzz_weight", ParamKind::Texture, "0", "Strength of the fuzz, in [0, 1]."},
           {"fuzz_color", ParamKind::Texture, "1", "Albedo of the fuzz, in [0, 1]."},
           {"fuzz_roughness", ParamKind::Texture, "0.5",

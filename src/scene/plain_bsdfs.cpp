@@ -135,9 +135,10 @@ void replace_openpbr(PlainScene& s, int index) {
         const bool is_seen_from_both_sides = thin && std::get<bool>(thin->value);
         const bool is_thin = is_seen_from_both_sides && !is_zero(o, "transmission_weight");
         if (!is_thin) rename(o, "transmission_weight", "spec_trans");
-        for (const char* name : {"base_weight", "base_diffuse_roughness",
-                                 "specular_roughness_anisotropy", "coat_color", "coat_roughness",
-                                 "coat_ior", "fuzz_color", "fuzz_roughness", "thin_walled"})
+        for (const char* name :
+             {"base_weight", "base_diffuse_roughness", "specular_roughness_anisotropy",
+              "coat_color", "coat_roughness", "coat_ior", "coat_affect_ior",
+              "coat_affect_roughness", "fuzz_color", "fuzz_roughness", "thin_walled"})
             remove(o, name);
         if (!is_thin) {
             remove(o, "transmission_color");

@@ -198,12 +198,16 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& tested) { return tested.param.name; });
 
 TEST(OpenPbr, AnisotropicMetalIsClosed) {
-    for (const double r : {0.3, 0.6, 1.0}) {
-        Made made(kWhite + kMetal + rough(r) + Values{{"specular_roughness_anisotropy", 0.8}});
-        for (const Vec3 wo :
-             {direction(0, 0), direction(40, 0), direction(40, 90), direction(70, 30)})
-            EXPECT_NEAR(albedo(made.lobe(), wo), 1, 0.005) << r << describe(wo);
-    }
+    for (const double anisotropy : {0.5, 0.8, 0.91, -0.91})
+        for (const double r : {0.3, 0.6, 0.8, 1.0}) {
+            Made made(kWhite + kMetal + rough(r) +
+                      Values{{"specular_roughness_anisotropy", anisotropy}});
+            for (const Vec3 wo :
+                 {direction(0, 0), direction(40, 0), direction(40, 90), direction(70, 30),
+                  direction(84, 6), direction(84, 45), direction(84, 84), direction(70, 75)})
+                EXPECT_NEAR(albedo(made.lobe(), wo), 1, 0.005)
+                    << anisotropy << " " << r << describe(wo);
+        }
 }
 
 // Textures make a table of rows, between which the albedo is interpolated.
@@ -356,6 +360,92 @@ TEST(OpenPbr, ACoatRoughensWhatLiesBelowByItsWeight) {
                             1e-5)
                     << base << " " << coat << " " << weight;
             }
+}
+
+// Other formats have a coat that does not.
+TEST(OpenPbr, ACoatMayLeaveTheRoughnessAsItIs) {
+    const Values coated = kMetal + kCoat + rough(0.1);
+    const auto at = [&](double share) {
+        return double(
+            Made(coated + Values{{"coat_affect_roughness", share}}).lobe().surface_roughness);
+    };
+    EXPECT_NEAR(at(0), 0.1, 1e-5);
+    EXPECT_NEAR(at(0.25), 0.75 * 0.1 + 0.25 * at(1), 1e-5);
+    EXPECT_GT(at(1), 0.3);
+}
+
+// η_s of the reference: the index relative to the coat, by its weight, and its inverse where that is below 1.
+TEST(OpenPbr, TheIndexBelowACoatIsRelativeToIt) {
+    const auto eta = [](const Values& values) {
+        return double(Made(values + Values{{"coat_weight", 1.0}}).lobe().eta);
+    };
+    const double relative = 1.6 / 1.5;
+    EXPECT_NEAR(eta({}), relative, 1e-6);
+    EXPECT_NEAR(eta({{"coat_weight", 0.25}}), 0.75 * 1.5 + 0.25 * relative, 1e-6);
+    EXPECT_NEAR(eta({{"coat_affect_ior", 0.5}}), 0.5 * 1.5 + 0.5 * relative, 1e-6);
+    EXPECT_NEAR(eta({{"coat_affect_ior", 0.0}}), 1.5, 1e-6);
+    EXPECT_NEAR(eta({{"specular_ior", 2.0}}), 1.25, 1e-6);
+    EXPECT_NEAR(eta({{"coat_ior", 1.0}}), 1.5, 1e-6);
+    // The weight is a factor of the reflectance below the coat.
+    const double root = 0.5 * (relative - 1) / (relative + 1);
+    EXPECT_NEAR(eta({{"specular_weight", 0.25}}), (1 + root) / (1 - root), 1e-6);
+    // Light that passes coat and glass is refracted as without the coat.
+    EXPECT_NEAR(eta(kGlass), 1.5, 1e-6);
+    EXPECT_LT(eta({{"specular_ior", 0.75}}), 1);
+}
+
+// A negative anisotropy stretches along v.
+TEST(OpenPbr, NegativeAnisotropyIsAQuarterTurn) {
+    const auto made = [](double anisotropy) {
+        return Made(kColors + kMetal + rough(0.5) +
+                    Values{{"specular_roughness_anisotropy", anisotropy}})
+            .lobe();
+    };
+    const OpenPbrLobe along_u = made(0.7), along_v = made(-0.7);
+    const auto turned = [](Vec3 w) { return Vec3{w.y, -w.x, w.z}; };
+    for (const Vec3 wo : test_directions())
+        for (const Vec3 wi : test_directions())
+            EXPECT_TRUE(
+                nearly(along_u.eval(wo, wi).f, along_v.eval(turned(wo), turned(wi)).f, 1e-3, 1e-6))
+                << describe(wo) << describe(wi);
+}
+
+// Facets with an α up to the least one along one direction may be rough along the other.
+TEST(OpenPbr, StretchedFacetsAreSmoothWhereTheirLobeIs) {
+    const double root = std::sqrt(double(Microfacet::kMinAlpha));
+    for (const double r : {0.99 * root, 1.01 * root, 0.5 * root}) {
+        Made made(kMetal + rough(r) + Values{{"specular_roughness_anisotropy", 0.9}});
+        EXPECT_EQ((*made).may_be_smooth(), made.lobe().has_smooth()) << r / root;
+        EXPECT_EQ((*made).may_have_delta(), made.lobe().has_delta()) << r / root;
+    }
+}
+
+TEST(OpenPbr, TheEstimateOfTheAlbedoHasTheLayers) {
+    const auto albedo_of = [](const Values& values) {
+        return Made(kMetal + Values{{"base_color", Rgb(0.5f)}} + values).lobe().albedo_estimate();
+    };
+    const Rgb coated =
+        albedo_of({{"coat_weight", 1.0}, {"coat_ior", 1.5}, {"coat_color", Rgb(0.1f, 0.5f, 1)}});
+    EXPECT_TRUE(nearly(coated, Rgb(0.04f) + 0.96f * 0.5f * Rgb(0.1f, 0.5f, 1), 1e-4, 0));
+    const Rgb fuzzy = albedo_of(Values{{"fuzz_color", Rgb(1, 0, 0)}} + kFuzz),
+              tinted = albedo_of(Values{{"fuzz_color", Rgb(0.5f)}} + kFuzz);
+    EXPECT_GT(fuzzy.r, 0.5f);
+    EXPECT_LT(fuzzy.g, 0.5f);
+    EXPECT_NEAR(tinted.r, 0.5f, 1e-4f);
+}
+
+TEST(OpenPbr, ATexturedCoatIsClosed) {
+    for (const Values& slab : {Values{}, Values{{"base_metalness", 0.4}}}) {
+        std::vector<Textured> all{{"coat_weight", Rgb(0)}};
+        Made made(kWhite + slab + rough(0.4) + Values{{"coat_roughness", 0.2}}, textures(all));
+        for (const float weight : {0.0f, 0.3f, 0.7f, 1.0f}) {
+            all[0].value = Rgb(weight);
+            const OpenPbrLobe lobe = made.lobe();
+            for (const float cos : {1.0f, 0.6f, 0.2f, 0.1f})
+                EXPECT_NEAR(albedo(lobe, {std::sqrt(1 - sqr(cos)), 0, cos}), 1, 0.005)
+                    << "weight " << weight << ", cosine " << cos;
+        }
+    }
 }
 
 TEST(OpenPbr, ThinWalledSurfacesReflectOnBothSides) {
@@ -550,7 +640,9 @@ TEST(OpenPbr, MaterialReadsItsParameters) {
                                                     {"fuzz_roughness", 2.0},
                                                     {"coat_color", Rgb(0.5f, 1.1f, 1)},
                                                     {"fuzz_color", Rgb(1.1f)},
-                                                    {"specular_roughness_anisotropy", -0.1}})
+                                                    {"specular_roughness_anisotropy", -1.1},
+                                                    {"coat_affect_ior", 1.1},
+                                                    {"coat_affect_roughness", -0.1}})
         EXPECT_THROW(Made(Values{{"coat_weight", 1.0}, {"fuzz_weight", 1.0}, wrong}), SceneError)
             << wrong.name;
     // Metal and dielectric are one component, glass is another one.
