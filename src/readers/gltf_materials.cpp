@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include <fmt/format.h>
 
@@ -104,11 +105,7 @@ void GltfReader::read_surface(const JsonValue& m, int surface, VertexColors colo
     // It is of what is not metal; `openpbr` has its colour at the edge of metal, too.
     if (const JsonValue specular = extension(m, "KHR_materials_specular");
         specular && (metal < 1 || metal_and_rough)) {
-        set_scalar(surface, "specular_weight", specular["specularFactor"].number(1, 0, 1),
-                   specular["specularTexture"], "opacity");
-        Color tint{colour(specular["specularColorFactor"], Rgb(1))};
-        if (tint.factor.max() > 0) tint.texture = bitmap(specular["specularColorTexture"], false);
-        set_color(surface, "specular_color", tint);
+        read_specular(m, specular, surface);
     }
     const double roughness = pbr["roughnessFactor"].number(1, 0, 1);
     if (const JsonValue brushed = extension(m, "KHR_materials_anisotropy"))
@@ -132,10 +129,47 @@ void GltfReader::read_surface(const JsonValue& m, int surface, VertexColors colo
         set_scalar(surface, "coat_roughness", coat["clearcoatRoughnessFactor"].number(0, 0, 1),
                    coat["clearcoatRoughnessTexture"], "g");
         set(surface, "coat_ior", 1.5);
-        if (const JsonValue t = coat["clearcoatNormalTexture"])
-            warn(fmt::format("{}: has no effect", t.path()));
+        // Its layers do not change each other.
+        for (const char* name : {"coat_affect_ior", "coat_affect_roughness"})
+            set(surface, name, 0.0);
+        if (coat["clearcoatFactor"].number(0, 0, 1) > 0) check_normals_of_coat(m, coat);
     }
     if (const JsonValue cloth = extension(m, "KHR_materials_sheen")) read_sheen(cloth, surface);
+}
+
+/// The coat has the normals of what lies below.
+void GltfReader::check_normals_of_coat(const JsonValue& m, const JsonValue& coat) {
+    const JsonValue below = m["normalTexture"], own = coat["clearcoatNormalTexture"];
+    const auto look_up = [](const JsonValue& t) {
+        const JsonValue transform = t["extensions"]["KHR_texture_transform"];
+        const auto numbers = [&](const char* name, double fallback) {
+            return transform[name].numbers(2, {fallback, fallback});
+        };
+        return std::tuple(t["index"].integer(-1, 0, 1 << 30), t["texCoord"].integer(0, 0, 1000),
+                          transform["texCoord"].integer(-1, 0, 1000), numbers("offset", 0),
+                          numbers("scale", 1), transform["rotation"].number(0),
+                          t["scale"].number(1));
+    };
+    if (own && below && look_up(own) == look_up(below)) return;
+    if (own) warn(fmt::format("{}: has no effect", own.path()));
+    if (below) warn(fmt::format("{}: the coat has this normal map, too", below.path()));
+}
+
+/// The weight sets an index of refraction, which must not bend light. So glass has it as a factor of the colour.
+void GltfReader::read_specular(const JsonValue& m, const JsonValue& specular, int surface) {
+    const bool bends_light = transmission(m) > 0 && has_volume(m);
+    const double weight = specular["specularFactor"].number(1, 0, 1);
+    Color tint{colour(specular["specularColorFactor"], Rgb(1))};
+    if (!bends_light)
+        set_scalar(surface, "specular_weight", weight, specular["specularTexture"], "opacity");
+    else
+        tint.factor = clamped(tint.factor * float(weight));
+    if (tint.factor.max() > 0) {
+        tint.texture = bitmap(specular["specularColorTexture"], false);
+        const int share = bends_light ? bitmap(specular["specularTexture"], true, "opacity") : -1;
+        if (share >= 0) tint.texture = tint.texture >= 0 ? product(tint.texture, share) : share;
+    }
+    set_color(surface, "specular_color", tint);
 }
 
 /// The weight of the fuzz is the largest component of the sheen's colour.

@@ -67,6 +67,8 @@ private:
     const Material& material(size_t index, VertexColors colors);
     Material read_material(const JsonValue& m, VertexColors colors);
     void read_surface(const JsonValue& m, int surface, VertexColors colors);
+    void read_specular(const JsonValue& m, const JsonValue& specular, int surface);
+    void check_normals_of_coat(const JsonValue& m, const JsonValue& coat);
     void read_sheen(const JsonValue& cloth, int surface);
     void read_anisotropy(const JsonValue& brushed, int surface, double roughness,
                          const JsonValue& texture);

@@ -217,6 +217,8 @@ TEST(Gltf, ExtensionsOfMaterialsSetTheirParameters) {
     EXPECT_EQ(value_of<double>(m, "coat_weight"), 0.3);
     EXPECT_EQ(value_of<double>(m, "coat_roughness"), 0.1);
     EXPECT_EQ(value_of<double>(m, "coat_ior"), 1.5);
+    EXPECT_EQ(value_of<double>(m, "coat_affect_ior"), 0);
+    EXPECT_EQ(value_of<double>(m, "coat_affect_roughness"), 0);
     EXPECT_NEAR(value_of<double>(m, "fuzz_weight"), 0.4, 1e-6);
     EXPECT_EQ(value_of<Rgb>(m, "fuzz_color"), Rgb(0.5f, 1, 0.5f));
     EXPECT_EQ(value_of<double>(m, "fuzz_roughness"), 0.3);
@@ -289,6 +291,72 @@ TEST(Gltf, SpecularReflectionHasAColourAndAWeight) {
         R"({"extensions":{"KHR_materials_specular":{"specularFactor":0.5,"specularColorFactor":[0,0,0]}}})");
     EXPECT_FALSE(find_type(metal, "openpbr").find("specular_color"));
     EXPECT_FALSE(find_type(metal, "openpbr").find("specular_weight"));
+}
+
+bool warns(const SceneDescription& scene, const std::string& text) {
+    return std::any_of(scene.warnings.begin(), scene.warnings.end(),
+                       [&](const std::string& w) { return w.find(text) != w.npos; });
+}
+
+// By their specification, it has no effect on the direction of refraction.
+TEST(Gltf, SpecularReflectionOfGlassLeavesItsIndex) {
+    const auto glass = [](const std::string& specular, bool is_solid = true) {
+        return with_material(R"({"pbrMetallicRoughness":{"metallicFactor":0},"extensions":{
+                "KHR_materials_transmission":{"transmissionFactor":1},)" +
+                                 std::string(is_solid ? R"("KHR_materials_volume":
+                {"thicknessFactor":1},)"
+                                                      : "") +
+                                 R"("KHR_materials_specular":{)" + specular + "}}}",
+                             R"(,"textures":[{"source":0},{"source":1}],
+                "images":[{"uri":"a.png"},{"uri":"b.png"}])");
+    };
+    const SceneDescription dull = glass(R"("specularFactor":0)");
+    EXPECT_FALSE(find_type(dull, "openpbr").find("specular_weight"));
+    EXPECT_EQ(value_of<Rgb>(find_type(dull, "openpbr"), "specular_color"), Rgb(0));
+    // Colours above 1 are weight.
+    const SceneDescription bright = glass(R"("specularFactor":0.5,"specularColorFactor":[1,2,4])");
+    EXPECT_EQ(value_of<Rgb>(find_type(bright, "openpbr"), "specular_color"), Rgb(0.5f, 1, 1));
+    const SceneDescription textured = glass(
+        R"("specularFactor":0.5,"specularTexture":{"index":0},"specularColorTexture":{"index":1})");
+    const SceneObject& m = find_type(textured, "openpbr");
+    EXPECT_FALSE(m.find("specular_weight"));
+    ASSERT_EQ(m.children.size(), 1u);
+    const SceneObject& scaled = texture_of(textured, m, "specular_color");
+    EXPECT_EQ(value_of<Rgb>(scaled, "scale"), Rgb(0.5f));
+    const SceneObject& both = texture_of(textured, scaled, "value");
+    EXPECT_EQ(value_of<std::string>(texture_of(textured, both, "value"), "filename"), "b.png");
+    const SceneObject& share = texture_of(textured, both, "scale");
+    EXPECT_EQ(value_of<std::string>(share, "filename"), "a.png");
+    EXPECT_EQ(value_of<std::string>(share, "channel"), "opacity");
+    // A pane bends no light.
+    const SceneDescription pane = glass(R"("specularFactor":0.25)", false);
+    EXPECT_EQ(value_of<double>(find_type(pane, "openpbr"), "specular_weight"), 0.25);
+}
+
+TEST(Gltf, NormalsOfClearCoatsAreThoseOfTheMaterial) {
+    const auto coated = [](const std::string& normal, const std::string& coat, int factor = 1) {
+        return with_material("{" + normal + R"("extensions":{"KHR_materials_clearcoat":{)" + coat +
+                                 R"("clearcoatFactor":)" + std::to_string(factor) + "}}}",
+                             R"(,"textures":[{"source":0},{"source":1}],
+                "images":[{"uri":"a.png"},{"uri":"b.png"}])");
+    };
+    const char *const kMap = R"("normalTexture":{"index":0,"scale":0.5},)",
+                      *const kShared = "the coat has this normal map, too",
+                      *const kLost = "clearcoatNormalTexture: has no effect";
+    const SceneDescription below = coated(kMap, "");
+    EXPECT_TRUE(warns(below, kShared));
+    EXPECT_FALSE(warns(below, kLost));
+    const SceneDescription same =
+        coated(kMap, R"("clearcoatNormalTexture":{"index":0,"scale":0.5},)");
+    expect_no_warning_of_materials(same);
+    for (const char* other : {R"("clearcoatNormalTexture":{"index":1,"scale":0.5},)",
+                              R"("clearcoatNormalTexture":{"index":0},)"}) {
+        const SceneDescription scene = coated(kMap, other);
+        EXPECT_TRUE(warns(scene, kShared) && warns(scene, kLost)) << other;
+    }
+    EXPECT_TRUE(warns(coated("", R"("clearcoatNormalTexture":{"index":0},)"), kLost));
+    expect_no_warning_of_materials(coated("", ""));
+    expect_no_warning_of_materials(coated(kMap, "", 0));
 }
 
 // The texels are taken to be 0.5 for the ratio of the roughnesses, which is exact there.
