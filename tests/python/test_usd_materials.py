@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+import warnings
 import zlib
 from pathlib import Path
 from struct import pack
@@ -117,6 +118,10 @@ def texture(inputs: str = "", file: str = "four.png", primvar: str = "st", more:
         {more}"""
 
 
+PRODUCT = """def Shader "Product" { uniform token info:id = "ND_multiply_color3"
+    color3f inputs:in1.connect = </Paint/Image.outputs:rgb>
+    color3f inputs:in2 = (0, 0, 0)
+    color3f outputs:out }"""
 EMISSIVE = "color3f inputs:emissiveColor.connect = </Paint/Image.outputs:rgb>\ncolor3f inputs:diffuseColor = (0, 0, 0)"
 GREY = ((128 / 255 + 0.055) / 1.055)**2.4
 
@@ -174,6 +179,33 @@ def test_single_channels(tmp_path: Path) -> None:
     cut = load(tmp_path, CAMERA + SKY + material(
         "float inputs:opacity.connect = </Paint/Image.outputs:a>\nfloat inputs:opacityThreshold = 0.5", texture(file="grey.png")))
     assert cut["/Quad.bsdf.opacity"]["type"] == "threshold" and cut["/Quad.bsdf.opacity.value.channel"] == "opacity"
+
+
+@pytest.mark.parametrize("scale, bias, ends", [(2, -1, (0, 1)), (-1, 0.5, (0.5, 0)), (-1, 0, (0, 0)), (-1, 1, None)])
+def test_scales_and_biases_below_0(tmp_path: Path, scale: float, bias: float, ends: tuple[float, float] | None) -> None:
+    png(tmp_path / "grey.png", np.array([[0, 128], [128, 255]]))
+    nodes = texture(f"float4 inputs:scale = ({scale}, 1, 1, 1)\nfloat4 inputs:bias = ({bias}, 0, 0, 0)", file="grey.png")
+    text = CAMERA + SKY + material("float inputs:roughness.connect = </Paint/Image.outputs:r>", nodes)
+    if ends is None:
+        d, ends = load(tmp_path, text), (1, 0)
+    else:
+        with pytest.warns(UserWarning, match=f"values below 0 are not clamped: they go from {ends[0]} for black to {ends[1]} for white"):
+            d = et.load(write(tmp_path, text))
+    p = d["/Quad.bsdf.bsdf.specular_roughness"]
+    assert (p["type"], p["value0"], p["value1"]) == ("mix", *ends)
+    image(d)
+
+
+def test_negative_colours_are_black(tmp_path: Path) -> None:
+    """Constants, factors of textures and strengths."""
+    png(tmp_path / "four.png", FOUR)
+    product = PRODUCT.replace("(0, 0, 0)", "(-1, 0.5, 1)")
+    for inputs, nodes in (("color3f inputs:specular_color = (1, -1, 1)", ""),
+                          ("color3f inputs:specular_color.connect = </Paint/Image.outputs:rgb>", "float4 inputs:scale = (-1, 1, 1, 1)"),
+                          ("color3f inputs:specular_color.connect = </Paint/Product.outputs:out>", "")):
+        image(load(tmp_path, CAMERA + SKY + material(inputs, texture(nodes, more=product), **OPEN_PBR)))
+    for inputs in ("color3f inputs:emission_color = (1, -1, 1)\nfloat inputs:emission_luminance = 1", "float inputs:emission_luminance = -1"):
+        image(load(tmp_path, CAMERA + SKY + material(inputs, **OPEN_PBR)))
 
 
 def test_normal_maps(tmp_path: Path) -> None:
@@ -314,6 +346,67 @@ def test_a_texture_of_the_roughness_of_a_preview_coat(tmp_path: Path) -> None:
     assert surface(tmp_path, inputs, texture(file="grey.png"))["coat_roughness"]["type"] == "bitmap"
 
 
+def test_what_a_coat_changes_below(tmp_path: Path) -> None:
+    """OpenPBR's coat blurs and has an index relative to which that below it counts; others do so where they are told to."""
+    names = ("coat_affect_ior", "coat_affect_roughness")
+    preview = surface(tmp_path, "float inputs:clearcoat = 1\nfloat inputs:clearcoatRoughness = 0.5")
+    standard = surface(tmp_path, "float inputs:coat = 1\nfloat inputs:coat_roughness = 0.5", **STANDARD)
+    assert [[p[n] for n in names] for p in (preview, standard)] == [[0, 0]] * 2
+    assert not any(n in surface(tmp_path, "float inputs:coat_weight = 1", **OPEN_PBR) for n in names)
+    blurred = """float inputs:coat = 0.5
+        float inputs:coat_affect_roughness = 0.25
+        float inputs:specular_roughness = 0.2
+        float inputs:coat_roughness"""
+    p = surface(tmp_path, f"{blurred} = 0.4", **STANDARD)
+    assert p["specular_roughness"] == pytest.approx(0.2 + 0.8 * 0.5 * 0.25 * 0.4) and p["coat_affect_roughness"] == 0
+    png(tmp_path / "grey.png", np.array([[0, 128], [128, 255]]))
+    text = CAMERA + SKY + material(f"{blurred}.connect = </Paint/Image.outputs:r>", texture(file="grey.png"), **STANDARD)
+    rough = load(tmp_path, text)["/Quad.bsdf.bsdf.specular_roughness"]
+    assert (rough["type"], rough["value0"], rough["value1"], rough["weight"]["scale"]) == ("mix", pytest.approx(0.2), 1, 0.125)
+    image(load(tmp_path, text))
+
+
+def test_the_specular_weight_leaves_the_index_of_glass(tmp_path: Path) -> None:
+    inputs = "float inputs:transmission = 1\nfloat inputs:specular%s\ncolor3f inputs:specular_color = (1, 0.5, 2)"
+    glass = load(tmp_path, CAMERA + SKY + material(inputs % " = 0.25", **STANDARD))["/Quad.bsdf"]
+    assert "specular_weight" not in glass and glass["specular_color"]["value"] == pytest.approx([0.25, 0.125, 0.5])
+    png(tmp_path / "grey.png", np.array([[0, 128], [128, 255]]))
+    text = CAMERA + SKY + material(inputs % ".connect = </Paint/Image.outputs:r>", texture(file="grey.png"), **STANDARD)
+    textured = load(tmp_path, text)["/Quad.bsdf"]
+    assert "specular_weight" not in textured and textured["specular_color"]["scale"]["type"] == "bitmap"
+    image(load(tmp_path, text))
+
+
+def notes_of(folder: Path, inputs: str, nodes: str = "", **model: str) -> list[str]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return [str(w).split("/Paint/Surface: ")[1] for w in et.load(write(folder, CAMERA + SKY + material(inputs, nodes, **model))).warnings]
+
+
+@pytest.mark.parametrize("model, weight, prefix", [(STANDARD, "coat", ""), (OPEN_PBR, "coat_weight", "geometry_")])
+def test_normals_of_coats(tmp_path: Path, model: dict[str, str], weight: str, prefix: str) -> None:
+    png(tmp_path / "normal.png", np.full((2, 2, 3), [128, 128, 255]))
+    standard = 'float4 inputs:scale = (2, 2, 2, 1)\nfloat4 inputs:bias = (-1, -1, -1, 0)\ntoken inputs:sourceColorSpace = "raw"'
+    nodes = texture(standard, file="normal.png") + texture(standard, file="normal.png").replace('"Image"', '"Other"').split("def Shader \"Reader")[0]
+    coat, below, own, other = f"float inputs:{weight} = 1\n", *(
+        f"float3 inputs:{prefix}{name}.connect = </Paint/{node}.outputs:rgb>\n"
+        for name, node in (("normal", "Image"), ("coat_normal", "Image"), ("coat_normal", "Other")))
+    shared, lost = f"the coat has the normals of inputs:{prefix}normal, too", f"inputs:{prefix}coat_normal has no effect"
+    for inputs, expected in ((coat, []), (below, []), (own, []), (coat + below, [shared]), (coat + own, [lost]),
+                             (coat + below + own, []), (coat + below + other, [lost, shared])):
+        assert notes_of(tmp_path, inputs, nodes, **model) == expected, inputs
+
+
+def test_inputs_of_layers_without_effect(tmp_path: Path) -> None:
+    assert notes_of(tmp_path, "float inputs:specular_rotation = 0.25", **STANDARD) == ["inputs:specular_rotation has no effect"]
+    for model, weight, names in (
+            (STANDARD, "coat", ("coat_affect_color", "coat_rotation")), (STANDARD, "subsurface", ("subsurface_scale", )),
+            (OPEN_PBR, "subsurface_weight", ("subsurface_radius", )), (OPEN_PBR, "coat_weight", ("coat_darkening", ))):
+        inputs = "".join(f"float inputs:{name} = 0.25\n" for name in names)
+        assert notes_of(tmp_path, inputs, **model) == []
+        assert sorted(notes_of(tmp_path, inputs + f"float inputs:{weight} = 1", **model)) == [f"inputs:{n} has no effect" for n in names]
+
+
 def test_open_pbr(tmp_path: Path) -> None:
     p = surface(tmp_path, "float inputs:base_metalness = 1\nfloat inputs:specular_weight = 0.5\nfloat inputs:coat_weight = 0.25",
                    **OPEN_PBR)
@@ -348,12 +441,6 @@ def test_colours_above_1_are_clamped(tmp_path: Path) -> None:
         image(made)
     opaque = load(tmp_path, CAMERA + SKY + material("color3f inputs:opacity = (2, 2, 2)", **STANDARD))
     assert opaque["/Quad.bsdf"]["type"] == "twosided"
-
-
-PRODUCT = """def Shader "Product" { uniform token info:id = "ND_multiply_color3"
-    color3f inputs:in1.connect = </Paint/Image.outputs:rgb>
-    color3f inputs:in2 = (0, 0, 0)
-    color3f outputs:out }"""
 
 
 @pytest.mark.parametrize("strength, scale, node", [(0, 1, "Image.outputs:rgb"), (1, 0, "Image.outputs:rgb"), (1, 1, "Product.outputs:out")])

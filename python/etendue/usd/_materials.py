@@ -116,7 +116,7 @@ def _surface(context: Context, shader: Any, model: Model) -> Material:
     made.bsdf = bsdf
     if emission is not None and opacity != 0:
         made.emitter = {"type": "area", "radiance": product(emission, context.exposure)}
-    for name in model.without_effect(inputs):
-        context.warn(shader, f"inputs:{name} has no effect")
+    for note in model.notes(inputs):
+        context.warn(shader, note)
     return made
 

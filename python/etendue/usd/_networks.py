@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from ._context import Context, Object, rgb
+from ._context import Context, Object, path_of, rgb
 from ._shaders import source_of, value_of
 from ._textures import bitmap, is_image, normal_scale
 
@@ -13,11 +13,11 @@ MOST_NODES = 32  # Along a path of connections.
 
 
 def product(texture: Any, factor: Any) -> Any:
-    """The product of a number, colour or texture and a number or colour."""
+    """The product of two numbers, colours or textures."""
     if factor == 1:
         return texture
     if not isinstance(texture, dict):
-        return texture * factor
+        return product(factor, texture) if isinstance(factor, dict) else texture * factor
     if texture["type"] == "rgb" and not isinstance(factor, dict):
         return rgb([x * factor for x in texture["value"]])
     return {"type": "scale", "value": texture, "scale": factor}
@@ -47,6 +47,11 @@ def bounded(color: Any) -> Any:
     return rgb([min(max(x, 0.0), 1.0) for x in color["value"]]) if color["type"] == "rgb" else color
 
 
+def _positive(value: Any) -> Any:
+    """The colour of a number or of three, without negative ones, which textures cannot have."""
+    return rgb([max(float(x), 0.0) for x in (value if hasattr(value, "__len__") else [value] * 3)])
+
+
 class Inputs:
     """The inputs of a surface shader. `material` collects the primvars of its textures."""
 
@@ -57,9 +62,9 @@ class Inputs:
         self.material = material
 
     def color(self, name: str) -> Any:
-        """A colour, or a texture."""
+        """A colour that is not negative, or a texture."""
         found = self._evaluate(self.shader, name, self.defaults[name], "rgb", 0)
-        return found if isinstance(found, dict) else rgb(found if hasattr(found, "__len__") else [found] * 3)
+        return found if isinstance(found, dict) else _positive(found)
 
     def scalar(self, name: str, most: float = 1.0) -> Any:
         """A number in [0, most], or a texture."""
@@ -79,6 +84,11 @@ class Inputs:
     def token(self, name: str) -> str:
         """A text."""
         return str(self._evaluate(self.shader, name, self.defaults[name], "r", 0))
+
+    def source(self, name: str) -> tuple[str, str] | None:
+        """The path of the node to which an input is connected, and its output."""
+        source = source_of(self.shader, name)
+        return None if source is None else (path_of(source[0]), source[1])
 
     def is_changed(self, name: str) -> bool:
         """Whether an input is connected or has another value than its default."""
@@ -143,7 +153,7 @@ class Inputs:
     def _product(self, node: Any, channel: str, depth: int) -> Any:
         a, b = (self._evaluate(node, name, 1.0, channel, depth) for name in ("in1", "in2"))
         if isinstance(a, dict) or isinstance(b, dict):
-            a, b = (x if isinstance(x, dict) or not hasattr(x, "__len__") else rgb(x) for x in (a, b))
+            a, b = (x if isinstance(x, dict) else _positive(x) if hasattr(x, "__len__") else max(x, 0.0) for x in (a, b))
             return product(a, b) if isinstance(a, dict) else product(b, a)
         if hasattr(a, "__len__") or hasattr(b, "__len__"):
             a, b = (x if hasattr(x, "__len__") else [x] * 3 for x in (a, b))

@@ -88,14 +88,17 @@ def _scaled(context: Context, node: Any, texture: Object, channel: str) -> Objec
     if channel != "rgb":
         i = "rgba".index(channel)
         s, b = float(scale[i]), float(bias[i])
-        if b != 0:
-            return {"type": "mix", "value0": b, "value1": s + b, "weight": texture}
-        return texture if s == 1 else {"type": "scale", "value": texture, "scale": s}
+        if b == 0 and s >= 0:
+            return texture if s == 1 else {"type": "scale", "value": texture, "scale": s}
+        black, white = max(b, 0.0), max(s + b, 0.0)
+        if (black, white) != (b, s + b):
+            context.warn(node, f"values below 0 are not clamped: they go from {black:g} for black to {white:g} for white")
+        return {"type": "mix", "value0": black, "value1": white, "weight": texture}
     if any(bias[:3]):
         context.warn(node, "inputs:bias of a colour has no effect")
     if scale[:3] == [1, 1, 1]:
         return texture
-    return {"type": "scale", "value": texture, "scale": rgb(scale[:3])}
+    return {"type": "scale", "value": texture, "scale": rgb([max(s, 0.0) for s in scale[:3]])}
 
 
 def _coordinates(context: Context, node: Any, known: list[str]) -> tuple[int, Matrix]:
