@@ -9,7 +9,7 @@ from typing import Any
 from .albedos import conductor, refraction_gain, rough_diffuse, schlick_mean
 from .images import ImageFiles
 from .nodes import Input, Output, surface_output, tree_of
-from .principled import principled
+from .principled import principled, stretched
 from .report import Refused, Report
 from .surfaces import (BLACK, SMOOTH, Surface, diffuse, dielectric, glass_gain, glossy, mixed, reflecting, rough, summed,
                        weighted_sum, with_normal)
@@ -91,12 +91,14 @@ def _metallic(node: Output, values: Values) -> Surface:
     roughness = values.number(node.input("Roughness"))
     if node.has("Thin Film Thickness") and node.input("Thin Film Thickness").value:
         values.warn(node, "Thin Film Thickness has no effect")
-    facets = rough(roughness, node, values, values.constant(node.input("Anisotropy"), node))
+    anisotropy = values.constant(node.input("Anisotropy"), node)
+    facets = rough(roughness, node, values, anisotropy)
     if node.node.fresnel_type == "F82":
         color, edge = values.color(node.input("Base Color")), values.color(node.input("Edge Tint"))
         if is_texture(color) or is_texture(edge):
-            bsdf = {"type": "openpbr", "base_metalness": 1.0, "specular_roughness": bounded(roughness), "base_color": parameter(bounded(color)),
-                    "specular_color": parameter(edge)}
+            a = min(max(anisotropy, -0.99), 0.99)
+            bsdf = {"type": "openpbr", "base_metalness": 1.0, "base_color": parameter(bounded(color)), "specular_color": parameter(edge),
+                    **stretched(roughness, (1 + a) ** 2 if a < 0 else (1 - a) ** -2)}
             return with_normal(Surface(reflecting(bsdf)), node, values)
         # The tint is a factor of Schlick's reflectance at 82 degrees.
         pairs = [conductor(c, (c + (1 - c) * (6 / 7) ** 5) * t) for c, t in zip(color, edge)]

@@ -43,6 +43,7 @@ NODES = {
     "principled half glass": (PRINCIPLED, dict(Base_Color=WHITE, Roughness=0.5, Transmission_Weight=0.5), "MULTI_GGX", "world", 1.02),
     "principled coat, tinted": (PRINCIPLED, dict(Base_Color=COLOR, Coat_Weight=1.0, Coat_Tint=(0.5, 0.8, 1.0), Coat_Roughness=0.3), "MULTI_GGX", "world", 1),
     "principled sheen": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5, Sheen_Weight=1.0), "MULTI_GGX", "world", 1.04),
+    "principled sheen, tinted": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5, Sheen_Weight=1.0, Sheen_Tint=(0.1, 0.2, 0.05)), "MULTI_GGX", "world", 1),
     "principled metal, tinted": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.3, Metallic=1.0, Specular_Tint=(0.3, 0.5, 0.9)), "MULTI_GGX", "world", 1),
     "principled, anisotropic": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=0.5, Metallic=1.0, Anisotropic=0.8), "MULTI_GGX", "world", 1.04),
     "principled rough metal": (PRINCIPLED, dict(Base_Color=COLOR, Roughness=1.0, Metallic=1.0), "MULTI_GGX", "world", 0.97),
@@ -99,6 +100,19 @@ def test_values_above_1_are_clamped(studio, kind, name):
     lit(studio, "world")
     images = []
     for value.outputs[0].default_value in (1.0, 1.5):
+        images.append(studio.render())
+    assert np.array_equal(*images)
+
+
+@pytest.mark.parametrize("name", ["Specular Tint", "Specular IOR Level", "Emission Color", "Emission Strength"])
+def test_values_below_0_are_clamped(studio, name):
+    material, tree, node = studio.material(PRINCIPLED, Emission_Color=COLOR, Emission_Strength=0.5)
+    value = tree.nodes.new("ShaderNodeValue")
+    tree.links.new(value.outputs[0], node.inputs[name])
+    studio.sphere(material)
+    lit(studio, "world")
+    images = []
+    for value.outputs[0].default_value in (0.0, -1.0):
         images.append(studio.render())
     assert np.array_equal(*images)
 
@@ -208,6 +222,118 @@ def test_textures_that_emit_nothing_are_no_emitters(studio, kind):
         tree.links.new(texture.outputs["Color"], node.inputs["Emission Color" if kind == PRINCIPLED else "Color"])
         node.inputs["Emission Strength" if kind == PRINCIPLED else "Strength"].default_value = 0
     assert read(studio, material).emission is None
+
+
+def test_the_coat_leaves_what_lies_below_as_it_is(studio):
+    bsdf = read(studio, studio.material(PRINCIPLED, Coat_Weight=1.0, Coat_Roughness=0.5)[0]).bsdf["bsdf"]
+    assert (bsdf["coat_affect_ior"], bsdf["coat_affect_roughness"]) == (0, 0)
+
+
+def linked(studio, tree, node, name, value=0.5):
+    """Links an image of one value to an input."""
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image = studio.image(lambda u, v: (value, value, value), width=2, height=2, color=False)
+    tree.links.new(texture.outputs["Color"], node.inputs[name])
+    return texture
+
+
+def parts(bsdf):
+    """The openpbr materials of a blend, with their weights; textures stand for 0.5."""
+    if bsdf["type"] == "blendbsdf":
+        weight = bsdf["weight"] if isinstance(bsdf["weight"], float) else 0.5
+        return [(share * w, p) for w, part in ((1 - weight, bsdf["bsdf"]), (weight, bsdf["bsdf_2"])) for share, p in parts(part)]
+    return [(1.0, bsdf)] if bsdf["type"] == "openpbr" else parts(bsdf["bsdf"])
+
+
+def shares(bsdf):
+    """The weights of metal, glass and the opaque dielectric, and the parameters of the parts that have them."""
+    sums, own = {"metal": 0.0, "glass": 0.0, "opaque": 0.0}, {"metal": [], "glass": [], "opaque": []}
+    for weight, part in parts(bsdf):
+        metal, glass = (0.5 if isinstance(part[n], dict) else part[n] for n in ("base_metalness", "transmission_weight"))
+        for name, share in (("metal", metal), ("glass", (1 - metal) * glass), ("opaque", (1 - metal) * (1 - glass))):
+            sums[name] += weight * share
+            own[name] += [part] if share else []
+    return sums, own
+
+
+@pytest.mark.parametrize("inputs, textured", [
+    (dict(Transmission_Weight=0.9), ()), (dict(Transmission_Weight=0.9, Metallic=0.25), ()), (dict(Metallic=0.25), ("Transmission Weight", )),
+    (dict(Transmission_Weight=0.9), ("Metallic", )), ({}, ("Transmission Weight", "Metallic")), ({}, ("Transmission Weight", )),
+    (dict(Transmission_Weight=1.0, Metallic=0.25), ())])
+def test_glass_has_its_own_index_and_round_facets(studio, inputs, textured):
+    """The level of the specular reflection and the anisotropy are of metal and of the opaque dielectric."""
+    material, tree, node = studio.material(PRINCIPLED, Specular_IOR_Level=0.0, Anisotropic=0.5, Roughness=0.4, **inputs)
+    for name in textured:
+        linked(studio, tree, node, name)
+    sums, own = shares(read(studio, material).bsdf)
+    metal = 0.5 if "Metallic" in textured else inputs.get("Metallic", 0)
+    glass = 0.5 if "Transmission Weight" in textured else inputs["Transmission_Weight"]
+    assert sums == pytest.approx({"metal": metal, "glass": (1 - metal) * glass, "opaque": (1 - metal) * (1 - glass)})
+    for part in own["glass"]:
+        assert "specular_weight" not in part and "specular_roughness_anisotropy" not in part
+        assert part["specular_roughness"] == pytest.approx(0.4)
+    assert all(part["specular_roughness_anisotropy"] == pytest.approx(0.45) for part in own["metal"] + own["opaque"])
+    assert all(part["specular_weight"] == 0 for part in own["opaque"])
+    studio.sphere(material)
+    lit(studio, "world")
+    assert studio.render().mean() > 0.1
+
+
+def test_plain_glass_is_one_material(studio):
+    for inputs in (dict(Transmission_Weight=1.0, Specular_IOR_Level=0.0, Anisotropic=0.5), dict(Transmission_Weight=0.5)):
+        bsdf = read(studio, studio.material(PRINCIPLED, **inputs)[0]).bsdf
+        assert bsdf["type"] == "openpbr" and "specular_roughness_anisotropy" not in bsdf
+
+
+def test_sheen_takes_no_more_than_its_colour(studio):
+    material, tree, node = studio.material(PRINCIPLED, Sheen_Weight=0.5, Sheen_Tint=(0.2, 0.4, 0.1))
+    bsdf = read(studio, material).bsdf["bsdf"]
+    assert bsdf["fuzz_weight"] == pytest.approx(0.2) and bsdf["fuzz_color"]["value"] == pytest.approx([0.5, 1, 0.25])
+    texture = linked(studio, tree, node, "Sheen Weight")
+    weight = read(studio, material).bsdf["bsdf"]["fuzz_weight"]
+    assert (weight["type"], weight["scale"]) == ("scale", pytest.approx(0.4))
+    tree.nodes.remove(texture)
+    linked(studio, tree, node, "Sheen Tint")
+    bsdf = read(studio, material).bsdf["bsdf"]
+    for name in ("fuzz_weight", "fuzz_color"):
+        assert (bsdf[name]["type"], bsdf[name]["output"], bsdf[name]["color"]["scale"]) == ("sheen_to_fuzz", name, 0.5)
+    studio.sphere(material)
+    lit(studio, "world")
+    assert studio.render().mean() > 0.1
+    node.inputs["Sheen Weight"].default_value = 0
+    assert "fuzz_weight" not in read(studio, material).bsdf["bsdf"]
+
+
+@pytest.mark.parametrize("anisotropy", [-0.6, 0.0, 0.6])
+def test_textured_metal_keeps_its_anisotropy(studio, anisotropy):
+    """The squares of the roughnesses along u and v are those of the constant metal."""
+    material, tree, node = studio.material("ShaderNodeBsdfMetallic", Roughness=0.4, Anisotropy=anisotropy)
+    node.distribution = "GGX"
+    constant = read(studio, material).bsdf
+    while constant["type"] != "roughconductor":
+        constant = constant["bsdf"]
+    linked(studio, tree, node, "Base Color")
+    bsdf = read(studio, material).bsdf["bsdf"]
+    a = bsdf["specular_roughness_anisotropy"]
+    aspect = 1 - a if a >= 0 else 1 / (1 + a)
+    along_u = bsdf["specular_roughness"] ** 2 * (2 / (1 + aspect**2)) ** 0.5
+    expected = [constant.get(name, constant.get("alpha")) for name in ("alpha_u", "alpha_v")]
+    assert [along_u, aspect * along_u] == pytest.approx(expected, rel=1e-5)
+
+
+def test_textured_coats_over_other_normals(studio):
+    """Their blend by the texture is that by its value."""
+    material, tree, node = studio.material(PRINCIPLED, Base_Color=COLOR, Coat_Weight=0.5)
+    bump = tree.nodes.new("ShaderNodeNormalMap")
+    linked(studio, tree, bump, "Color", 0.6)
+    tree.links.new(bump.outputs[0], node.inputs["Normal"])
+    studio.sphere(material)
+    lit(studio, "world")
+    expected = studio.render().mean()
+    node.inputs["Coat Weight"].default_value = 0
+    linked(studio, tree, node, "Coat Weight")
+    assert read(studio, material).bsdf["type"] == "blendbsdf"
+    assert studio.render().mean() == pytest.approx(expected, rel=0.01)
 
 
 POWERS = [("POWER", 0.0, -1.0), ("POWER", -0.5, 2.0), ("POWER", -0.5, 0.5), ("POWER", 1e30, 9.0), ("DIVIDE", 1.0, 0.0)]
