@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import time
@@ -458,3 +459,45 @@ def test_the_zip_is_an_extension_that_blender_installs(tmp_path):
     code = _INSTALL.format(zip=str(file))
     run = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
     assert "engine: ETENDUE" in run.stdout, run.stdout + run.stderr
+
+
+_RENDER = """
+import os
+import sys
+import bpy
+import addon_utils
+assert not any("etendue" in p for p in sys.path), sys.path
+addon_utils.enable("bl_pkg")
+bpy.ops.extensions.package_install_files(filepath={zip!r}, repo="user_default", enable_on_install=True)
+import etendue
+print("package:", etendue.__file__)
+bpy.ops.wm.open_mainfile(filepath={blend!r}, load_ui=False)
+print("engine:", bpy.context.scene.render.engine)
+bpy.context.scene.render.filepath = {image!r}
+bpy.ops.render.render(write_still=True)
+sys.stdout.flush()
+os._exit(0)
+"""
+
+
+def test_the_zip_with_the_wheel_renders_without_anything_else(studio, tmp_path):
+    """One file is installed in a Blender whose Python does not have etendue."""
+    wheels = sorted((ROOT / "out/wheel").glob("*cp311*.whl"))
+    wheel = os.environ.get("ETENDUE_WHEEL") or (str(wheels[-1]) if wheels else "")
+    if not wheel:
+        pytest.skip("there is no wheel for Python 3.11 in out/wheel (ETENDUE_WHEEL)")
+    furnished(studio)
+    ours = studio.render()
+    blend, image, home = (tmp_path / name for name in ("scene.blend", "alone.exr", "home"))
+    studio.scene.render.engine = "ETENDUE"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    subprocess.run([ROOT / "scripts/blender-addon", wheel], check=True, capture_output=True)
+    file = shutil.move(ROOT / "out/etendue-blender.zip", tmp_path / "etendue-blender.zip")
+    home.mkdir()
+    environment = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "ETENDUE"))}
+    environment["BLENDER_USER_RESOURCES"] = str(home)
+    code = _RENDER.format(zip=str(file), blend=str(blend), image=str(image))
+    run = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, cwd=tmp_path)
+    assert f"package: {home}" in run.stdout and "engine: ETENDUE" in run.stdout, run.stdout + run.stderr
+    again = et.read_image(image)[..., :3]
+    assert again.mean() == pytest.approx(ours.mean(), rel=1e-3) and np.abs(again - ours).mean() < 1e-3 * ours.mean()
