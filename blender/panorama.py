@@ -27,15 +27,22 @@ _COSMETIC = {"location", "location_absolute", "width", "height", "select", "hide
 
 _folder: tempfile.TemporaryDirectory[str] | None = None
 _images: dict[str, str | None] = {}
-"""The image of each world by a digest of its nodes, so that a viewport does not wait again for what it has."""
+"""The image of each world by a digest of its nodes, so that a viewport does not wait again for what it has; the newest last."""
+_KEPT = 16
 
 
 def panorama(world: Any, frame: int, threads: int, where: str) -> str | None:
     """The file with the radiance of an evaluated world, as surfaces receive it; None if it is black."""
     key = _digest(world, frame)
-    if key not in _images or not Path(_images[key] or __file__).exists():
-        _images[key] = _render(world, f"world-{key[:12]}", frame, threads, where)
-    return _images[key]
+    image = _images.pop(key, "")
+    if image == "":
+        image = _render(world, f"world-{key[:12]}", frame, threads, where)
+    _images[key] = image
+    while len(_images) > _KEPT:
+        oldest = _images.pop(next(iter(_images)))
+        if oldest:
+            Path(oldest).unlink(missing_ok=True)
+    return image
 
 
 def _render(world: Any, name: str, frame: int, threads: int, where: str) -> str | None:

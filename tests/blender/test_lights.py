@@ -175,6 +175,7 @@ def test_images_of_worlds_are_made_once_for_the_same_nodes(studio, monkeypatch):
     module, made = sys.modules["etendue_addon.panorama"], []
     monkeypatch.setattr(module, "_render", lambda *_: made.append(None))
     monkeypatch.setattr(module, "_images", {})
+    monkeypatch.setattr(module, "_KEPT", 2)
     tree, background = studio.world()
     noisy(tree, background)
     studio.plane(material=gray(studio))
@@ -197,7 +198,9 @@ def test_images_of_worlds_are_made_once_for_the_same_nodes(studio, monkeypatch):
     assert change(texture.inputs["Scale"], "default_value", 3) == 6
     group.links.new(texture.outputs[1], ramp.inputs[0])
     studio.render()
-    assert len(made) == 7
+    assert len(made) == 7 and len(module._images) == 2
+    assert change(texture.inputs["Scale"], "default_value", 2) == 8
+    assert change(texture.inputs["Scale"], "default_value", 3) == 8
 
 
 def test_light_paths_of_a_world_are_those_of_diffuse_light(studio, coarse, capfd):
