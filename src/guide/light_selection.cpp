@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 
-#include "math/bounds.h"
 #include "math/hash.h"
 
 namespace etendue {
@@ -31,7 +30,10 @@ size_t LightSelection::memory_bytes() const {
 LightSelections::LightSelections(std::vector<Arrival> arrivals, const std::vector<float>& pmf) {
     std::erase_if(arrivals,
                   [](const Arrival& a) { return !(a.at.weight > 0 && a.at.weight < kInf); });
-    const size_t places = split(KdSplits::kRoot, arrivals, 0) * kSurfaceSides;
+    constexpr size_t kMostInLeaf = 128;
+    const std::vector<uint32_t> leaves = splits_.divide_all(
+        std::span(arrivals), kMostInLeaf, [](const Arrival& a) { return a.at.p; });
+    const size_t places = (leaves.size() - 1) * kSurfaceSides;
     std::vector<Placed> placed;
     std::array<std::vector<Placed>, 2> halves;
     for (const Arrival& a : arrivals) {
@@ -49,27 +51,6 @@ LightSelections::LightSelections(std::vector<Arrival> arrivals, const std::vecto
     }
     gain_ = sum > 0 ? float(gain / sum) : 0.0f;
     set(std::move(placed), places);
-}
-
-/// Divides a node until its leaves have few arrivals, whose order it changes; `leaves` are there already. Returns how many there
-/// are then.
-size_t LightSelections::split(uint32_t node, std::span<Arrival> arrivals, size_t leaves) {
-    constexpr size_t kMostArrivals = 128;
-    Bounds3 box;
-    for (const Arrival& a : arrivals) box.extend(a.at.p);
-    const Vec3 size = box.hi - box.lo;
-    const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-    const float at = arrivals.empty() ? 0.0f : box.center()[axis];
-    // A plane through coincident points leaves one side empty.
-    if (arrivals.size() <= kMostArrivals || !(box.lo[axis] < at)) {
-        splits_.set_leaf(node, leaves);
-        return leaves + 1;
-    }
-    const auto middle = std::stable_partition(arrivals.begin(), arrivals.end(),
-                                              [&](const Arrival& a) { return a.at.p[axis] < at; });
-    const uint32_t below = splits_.divide(node, axis, at);
-    leaves = split(below, {arrivals.begin(), middle}, leaves);
-    return split(below + 1, {middle, arrivals.end()}, leaves);
 }
 
 /// Sums up the weights by place and emitter.

@@ -93,7 +93,6 @@ private:
         uint32_t place, arrivals;
     };
     size_t place(Vec3 p, Vec3 n) const { return splits_.leaf(p) * kSurfaceSides + surface_side(n); }
-    size_t split(uint32_t node, std::span<Arrival> arrivals, size_t leaves);
     void set(std::vector<Placed> arrivals, size_t places);
     void tabulate(size_t places);
 

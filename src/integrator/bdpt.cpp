@@ -90,7 +90,7 @@ public:
     void load(LearnedState& from) override { paths_.load(from); }
     void prepare(const PassContext& pass) override {
         paths_.train(pass);
-        paths_.decide_specular(pass, counts(pass.scene, pass.light_paths));
+        paths_.prepare_specular(pass, counts(pass.scene, pass.light_paths));
     }
 
     void trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
@@ -111,7 +111,7 @@ public:
         return given_light_paths_ > 0 ? given_light_paths_ : scene.film().pixel_count();
     }
     bool samples_alone() const override {
-        return !paths_.guiding().is_on() && !paths_.specular().is_automatic();
+        return !paths_.guiding().is_on() && !paths_.specular().is_on();
     }
     Estimator estimator() const override { return Estimator::Unbiased; }
     std::vector<std::pair<std::string, double>> figures() const override {

@@ -37,9 +37,9 @@ public:
         guiding_.train(pass, depth_, walks);
     }
 
-    /// Decides on specular connections, see Specular::decide(). For Integrator::prepare(), after train().
-    void decide_specular(const PassContext& pass, const TechniqueCounts& counts) {
-        specular_.decide(pass, depth_, counts);
+    /// See Specular::prepare(). For Integrator::prepare(), after train().
+    void prepare_specular(const PassContext& pass, const TechniqueCounts& counts) {
+        specular_.prepare(pass, depth_, counts);
     }
 
     /// Sets the thresholds of efficiency-optimised roulette from the statistics of earlier passes, in which all samples
@@ -106,7 +106,7 @@ public:
     void add_specular(const SampleContext& c, const TechniqueCounts& counts, int t,
                       Workspace& work) const {
         if (counts.specular_depth > 0)
-            Specular::add(c, t, depth_.max_depth, threshold(c), counts, work);
+            specular_.add(c, t, depth_.max_depth, threshold(c), counts, work);
     }
 
     /// Adds the join, times `factor`, if it exists and passes test(), whose result is returned. If z_{t-1} has several

@@ -29,7 +29,7 @@ public:
     }
     void prepare(const PassContext& pass) override {
         guiding_.train(pass, depth_, GuidedWalks::Eye);
-        specular_.decide(pass, depth_, counts(pass.scene, 0));
+        specular_.prepare(pass, depth_, counts(pass.scene, 0));
     }
 
     void trace_eye_paths(std::span<const SampleContext> c, std::span<SubPath> z,
@@ -48,7 +48,7 @@ public:
                 if (const float Tr = visibility(c.scene, *j, work.stats); Tr > 0)
                     c.sink.add(*j, j->contribution * Tr);
             if (counts.specular_depth > 0)
-                Specular::add(c, t, depth_.max_depth, threshold(c), counts, work);
+                specular_.add(c, t, depth_.max_depth, threshold(c), counts, work);
         }
     }
 
@@ -64,7 +64,7 @@ public:
         specular_.add_figures(figures);
         return figures;
     }
-    bool samples_alone() const override { return !guiding_.is_on() && !specular_.is_automatic(); }
+    bool samples_alone() const override { return !guiding_.is_on() && !specular_.is_on(); }
     Estimator estimator() const override { return Estimator::Unbiased; }
 
 private:

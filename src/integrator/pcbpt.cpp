@@ -51,7 +51,7 @@ public:
     void load(LearnedState& from) override { paths_.load(from); }
     void prepare(const PassContext& pass) override {
         paths_.train(pass);
-        paths_.decide_specular(pass, counts(pass.scene, pass.light_paths));
+        paths_.prepare_specular(pass, counts(pass.scene, pass.light_paths));
     }
     void trace(const PassContext& pass) override {
         const TechniqueCounts n = counts(pass.scene, pass.light_paths);

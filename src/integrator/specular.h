@@ -12,11 +12,11 @@ public:
     Specular() = default;
     explicit Specular(const IntegratorParams& params);
 
-    /// With `specular_connections=auto`: decides before pass 0 whether the rendering uses them. `counts`: those of the
-    /// method where it does. For Integrator::prepare().
-    void decide(const PassContext& pass, const DepthOptions& depth, const TechniqueCounts& counts);
-    /// Whether decide() decides anything.
-    bool is_automatic() const { return mode_ == Mode::Auto; }
+    /// Traces the photons from which searches begin. With `specular_connections=auto`, decides before pass 0 whether the rendering
+    /// uses specular connections. `counts`: those of the method where it does. For Integrator::prepare().
+    void prepare(const PassContext& pass, const DepthOptions& depth, const TechniqueCounts& counts);
+    /// Whether prepare() prepares anything.
+    bool is_on() const { return mode_ != Mode::Off; }
     void save(LearnedState& to) const;
     void load(LearnedState& from);
     /// See Integrator::figures().
@@ -40,9 +40,10 @@ public:
             hit.mis_weight *= hit_lens_beside_specular(scene, y, s, counts);
     }
     /// Adds X(s,t) of z_{t-1}, where the counts have any. `threshold`: as SpecularLimits::threshold.
-    static void add(const SampleContext& c, int t, int max_depth, float threshold,
-                    const TechniqueCounts& counts, Workspace& work) {
-        const SpecularLimits limits{max_depth, threshold};
+    void add(const SampleContext& c, int t, int max_depth, float threshold,
+             const TechniqueCounts& counts, Workspace& work) const {
+        const SpecularLimits limits{
+            .max_depth = max_depth, .threshold = threshold, .photons = &photons_};
         if (const auto j = join_specular(c.scene, work.z, t, limits, c.sampler, counts, work))
             c.sink.add(*j, j->contribution);
     }
@@ -52,6 +53,7 @@ private:
     Mode mode_ = Mode::Off;
     bool is_used_ = false;
     int depth_ = 0;
+    SeedPhotons photons_;
 };
 
 }  // namespace etendue

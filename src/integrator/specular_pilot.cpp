@@ -42,8 +42,8 @@ struct Block {
 };
 
 /// Adds the contributions of one eye walk.
-void add_walk(const WalkContext& walk, int max_depth, const SubPath& z, Sampler& sampler,
-              Workspace& work, TileSums& to) {
+void add_walk(const WalkContext& walk, int max_depth, const SeedPhotons& photons, const SubPath& z,
+              Sampler& sampler, Workspace& work, TileSums& to) {
     const TechniqueCounts& n = walk.counts;
     double others = 0, hits = 0, chains = 0;
     double squares_of_hits = 0, squares_of_weighted = 0;
@@ -65,7 +65,8 @@ void add_walk(const WalkContext& walk, int max_depth, const SubPath& z, Sampler&
             others += double(luminance(j->contribution) * j->mis_weight *
                              visibility(walk.scene, *j, work.stats));
         const uint64_t before = work.stats.chain_trials;
-        const SpecularLimits limits{.max_depth = max_depth, .most_trials = kMostTrials};
+        const SpecularLimits limits{
+            .max_depth = max_depth, .most_trials = kMostTrials, .photons = &photons};
         const auto x = join_specular(walk.scene, z, t, limits, sampler, n, work);
         if (!x) continue;
         const double w = double(x->mis_weight), v = double(luminance(x->contribution)) * w;
@@ -92,7 +93,7 @@ void add_walk(const WalkContext& walk, int max_depth, const SubPath& z, Sampler&
 }  // namespace
 
 SpecularPilot run_specular_pilot(const PassContext& pass, const DepthOptions& depth,
-                                 const TechniqueCounts& counts) {
+                                 const TechniqueCounts& counts, const SeedPhotons& photons) {
     const uint64_t seed = pilot_seed(pass.seed, PilotUse::Specular);
     const FilmGeometry& film = pass.film.geometry();
     std::vector<Block> blocks(kWalks / kBlock);
@@ -110,7 +111,7 @@ SpecularPilot run_specular_pilot(const PassContext& pass, const DepthOptions& de
             // Each eye vertex is connected to each light vertex.
             if (counts.connect > 0)
                 block.rays_without += double(work.y.size()) * double(work.z.size());
-            add_walk(walk, depth.max_depth, work.z, sampler, work,
+            add_walk(walk, depth.max_depth, photons, work.z, sampler, work,
                      block.tiles[tile_of(film, work.z.film)]);
         }
         block.rays_without += double(work.stats.walk_rays + work.stats.shadow_rays);

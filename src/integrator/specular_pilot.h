@@ -2,6 +2,7 @@
 // Some walks before the first pass, which tell whether specular connections are worth their time.
 
 #include "integrator/integrator.h"
+#include "manifold/seed_photons.h"
 
 namespace etendue {
 
@@ -25,8 +26,8 @@ struct SpecularPilot {
     }
 };
 
-/// Walks with random numbers that no pass uses. `counts` has specular connections.
+/// Walks with random numbers that no pass uses. `counts` has specular connections, whose seeds are drawn from `photons`, too.
 SpecularPilot run_specular_pilot(const PassContext& pass, const DepthOptions& depth,
-                                 const TechniqueCounts& counts);
+                                 const TechniqueCounts& counts, const SeedPhotons& photons);
 
 }  // namespace etendue

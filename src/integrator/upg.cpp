@@ -82,7 +82,7 @@ public:
 
     void prepare(const PassContext& pass) override {
         paths_.train(pass, GuidedWalks::BothWithPairs);
-        paths_.decide_specular(pass, counts(pass.scene, pass.light_paths));
+        paths_.prepare_specular(pass, counts(pass.scene, pass.light_paths));
         if (pass.film.passes() == 0) start(pass);
     }
     void trace(const PassContext& pass) override {

@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace etendue {
 
 ChainSeeds::ChainSeeds(const Scene& scene, const Vertex& from, const LampPoint& lamp, int depth,
-                       ChainTracer& tracer, RenderStats& stats)
-    : scene_(scene), from_(from), lamp_(lamp), depth_(depth), tracer_(tracer), stats_(stats) {
+                       const SeedPhotons& photons, ChainTracer& tracer, RenderStats& stats)
+    : scene_(scene), from_(from), lamp_(lamp), depth_(depth),
+      photons_(photons.near(from.p, side_normal(from), lamp.emitter->index)), tracer_(tracer),
+      stats_(stats) {
     constexpr size_t kMany = 64;
     const std::vector<ClearShape>& shapes = scene.clear_shapes();
     if (shapes.size() < 2 || shapes.size() > kMany) return;
@@ -31,32 +32,31 @@ const ClearShape& ChainSeeds::choose_shape(float u) const {
     return shapes[std::min(i, shapes.size() - 1)];
 }
 
-std::optional<Vec3d> ChainSeeds::about_lamp(float u_angle, float u_around) const {
-    // Angles of all sizes: panes hardly turn light, balls and waves do.
-    constexpr double kSmallest = 0.005, kLargest = 1;
-    const Vec3d v = lamp_.is_infinite() ? Vec3d(lamp_.p) : Vec3d(lamp_.p) - Vec3d(from_.p);
-    if (!(dot(v, v) > 0)) return {};
-    const Vec3d to_lamp = normalize(v);
-    const double angle = kSmallest * std::pow(kLargest / kSmallest, double(u_angle)),
-                 around = 2 * std::numbers::pi * double(u_around);
-    const TangentBasis basis(to_lamp);
-    return normalize(to_lamp * std::cos(angle) +
-                     (basis.s * std::cos(around) + basis.t * std::sin(around)) * std::sin(angle));
-}
-
 std::optional<Vec3d> ChainSeeds::first_direction(Sampler& sampler) const {
-    constexpr float kShareOfLamp = 0.4f, kShareOfShapes = 0.35f;
-    const float u = sampler.next_1d(), u_lobe = sampler.next_1d();
+    constexpr float kShareOfPhotons = 0.75f;  // of all where there are photons
+    constexpr float kShareOfShapes = 0.6f;    // of the others
+    float u = sampler.next_1d();
+    const float u_lobe = sampler.next_1d();
     const Vec2 u_direction = sampler.next_2d();
-    if (u < kShareOfLamp) return about_lamp(u_lobe, u_direction.x);
-    const float u_shape = (u - kShareOfLamp) / kShareOfShapes;
+    if (!photons_.empty()) {
+        if (u < kShareOfPhotons) {
+            const size_t i = size_t(u_lobe * float(photons_.size()));
+            return toward(photons_[std::min(i, photons_.size() - 1)].left);
+        }
+        u = (u - kShareOfPhotons) / (1 - kShareOfPhotons);
+    }
+    const float u_shape = u / kShareOfShapes;
     if (scene_.clear_shapes().empty() || u_shape >= 1) {
         const auto s = from_.sample_unguided(u_lobe, u_direction, TransportMode::Radiance);
         if (!s || s->is_delta) return {};
         return normalize(Vec3d(s->wi));
     }
     const ClearShape& shape = choose_shape(u_shape);
-    const Vec3d v = Vec3d(scene_.point_on(shape, u_lobe, u_direction)) - Vec3d(from_.p);
+    return toward(scene_.point_on(shape, u_lobe, u_direction));
+}
+
+std::optional<Vec3d> ChainSeeds::toward(Vec3 p) const {
+    const Vec3d v = Vec3d(p) - Vec3d(from_.p);
     if (!(dot(v, v) > 0)) return {};
     return normalize(v);
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "manifold/chain.h"
+#include "manifold/seed_photons.h"
 #include "sampler/sampler.h"
 
 namespace etendue {
@@ -22,19 +23,19 @@ class ChainSeeds {
 public:
     /// `depth`: most events of a chain, at most ChainEvents::kMost. What is referred to must outlive this.
     ChainSeeds(const Scene& scene, const Vertex& from, const LampPoint& lamp, int depth,
-               ChainTracer& tracer, RenderStats& stats);
+               const SeedPhotons& photons, ChainTracer& tracer, RenderStats& stats);
 
-    /// A walk leaves the eye vertex and goes on by delta events: in a direction of its own BSDF, without guide, in one about
-    /// the direction to the lamp's point, or toward a random point of a shape that has delta events alone. Of the chains that lead from the eye vertex to a surface on this
-    /// walk, one is chosen uniformly among those from whose last surface the ray leaves on the side of the lamp's point,
-    /// which that surface sees. Every condition on a seed also holds for the seeds near a solution, and directions of the BSDF reach
-    /// all solutions that contribute. So each solution that is not degenerate has a positive probability. Empty where the walk has no such
-    /// chain, or the seed is known to have other events than `only`.
+    /// A walk leaves the eye vertex and goes on by delta events: toward where a photon near it had its last event, toward a
+    /// random point of a shape that has delta events alone, or in a direction of its own BSDF, without guide. Of the chains that lead from the eye vertex to a surface on this walk, one is chosen uniformly
+    /// among those from whose last surface the ray leaves on the side of the lamp's point, which that surface sees. Every
+    /// condition on a seed also holds for the seeds near a solution, and directions of the BSDF reach all solutions that
+    /// contribute. So each solution that is not degenerate has a positive probability. Empty where the walk has no such chain, or
+    /// the seed is known to have other events than `only`.
     std::optional<ChainSeed> draw(Sampler& sampler, const ChainEvents* only = nullptr);
 
 private:
     std::optional<Vec3d> first_direction(Sampler& sampler) const;
-    std::optional<Vec3d> about_lamp(float u_angle, float u_around) const;
+    std::optional<Vec3d> toward(Vec3 p) const;
     const ClearShape& choose_shape(float u) const;
     /// L_e |cos θ| of the lamp toward the surface that the tracer has left, if the chain may end there.
     Rgb emission_here() const;
@@ -43,6 +44,7 @@ private:
     const Vertex& from_;
     const LampPoint& lamp_;
     int depth_;
+    std::span<const SeedPhoton> photons_;  ///< Near the eye vertex, of the lamp.
     ChainTracer& tracer_;
     RenderStats& stats_;
     /// Partial sums over the clear shapes of what is proportional to the probability of their choice; empty where there are

@@ -166,7 +166,9 @@ std::optional<Join> join_specular(const Scene& scene, const SubPath& z, int t,
     const LampPoint lamp = draw_lamp_point(scene, sampler);
     if (!(lamp.pdf > 0)) return {};
     ChainTracer tracer(scene, from, work.stats);
-    ChainSeeds seeds(scene, from, lamp, depth, tracer, work.stats);
+    static const SeedPhotons kNone;
+    ChainSeeds seeds(scene, from, lamp, depth, limits.photons ? *limits.photons : kNone, tracer,
+                     work.stats);
     sampler.seek(Stream::Auxiliary, kTrials | uint64_t(t));
     const auto seed = seeds.draw(sampler);
     if (!seed) return {};

@@ -29,6 +29,8 @@ struct SpecularLimits {
     float threshold = 0;
     /// Where a search takes more, this number is taken instead: the contribution is then too small, which is counted.
     uint64_t most_trials = 10'000'000;
+    /// From which seeds are drawn, too; must not depend on the sample.
+    const SeedPhotons* photons = nullptr;
 };
 
 /// Whether paths whose eye path begins with z_0 … z_{t-1}, and goes on from there by delta events to a lamp, are made by hits alone

@@ -19,6 +19,7 @@ inline const std::vector<const char*>& resumable_methods() {
     static const std::vector<const char*> methods{
         "path",
         "path:guide=on,guide_roulette=false,guide_walks=8000",
+        "path:specular_connections=on",
         "light",
         "light:guide=on,guide_walks=2000",
         "bdpt",

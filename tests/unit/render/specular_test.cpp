@@ -85,6 +85,20 @@ TEST(SpecularOption, AutoLeavesLargeLampsToHits) {
     }
 }
 
+/// Through glass with facets, each of which may have a way to the lamp. Without photons a way would need some fifty trials.
+TEST(SpecularOption, FindsChainsByPhotons) {
+    const Scene scene =
+        build(front_camera(kSize) + room() +
+              "<shape type=\"obj\"><string name=\"filename\" value=\"" ETENDUE_SOURCE_DIR
+              "/tests/scenes/icosahedron.obj\"/><boolean name=\"face_normals\" "
+              "value=\"true\"/><transform "
+              "name=\"to_world\"><scale value=\"0.4\"/><translate y=\"0.2\"/></transform>" +
+              kGlass + "</shape>" + point_light("0.2,0.9,0.1"));
+    const RenderStats stats = render(scene, "path:specular_connections=on").stats;
+    EXPECT_GT(stats.chains, 100u);
+    EXPECT_LT(double(stats.chain_trials) / double(stats.chains), 10);
+}
+
 TEST(SpecularOption, AutoDoesNotDependOnThreads) {
     const Scene scene = build(lantern_room(front_camera(kSize)));
     const SpecularRendering one = render(scene, "path:specular_connections=auto", 1),
