@@ -9,7 +9,7 @@ from typing import Any
 from .albedos import conductor, refraction_gain, rough_diffuse, schlick_mean
 from .images import ImageFiles
 from .nodes import Input, Output, surface_output, tree_of
-from .principled import principled, stretched
+from .principled import principled, stretched, warn_of_tangents
 from .report import Refused, Report
 from .surfaces import (BLACK, SMOOTH, Surface, diffuse, dielectric, glass_gain, glossy, mixed, reflecting, rough, summed,
                        weighted_sum, with_normal)
@@ -79,9 +79,19 @@ def _diffuse(node: Output, values: Values) -> Surface:
     return with_normal(diffuse(color), node, values)
 
 
+def _anisotropy(node: Output, values: Values) -> float:
+    anisotropy = values.constant(node.input("Anisotropy"), node)
+    if anisotropy:
+        warn_of_tangents(node, values)
+        rotation = node.input("Rotation")
+        if rotation.source() or rotation.value:
+            values.warn(node, "Rotation has no effect")
+    return anisotropy
+
+
 def _glossy(node: Output, values: Values) -> Surface:
     color, roughness = values.color(node.input("Color")), values.number(node.input("Roughness"))
-    anisotropy = values.constant(node.input("Anisotropy"), node)
+    anisotropy = _anisotropy(node, values)
     facets = rough(roughness, node, values, anisotropy)
     bsdf = {"type": "roughconductor" if facets else "conductor", **facets, "specular_reflectance": parameter(color)}
     return with_normal(glossy(bsdf, color, roughness, node), node, values)
@@ -91,7 +101,7 @@ def _metallic(node: Output, values: Values) -> Surface:
     roughness = values.number(node.input("Roughness"))
     if node.has("Thin Film Thickness") and node.input("Thin Film Thickness").value:
         values.warn(node, "Thin Film Thickness has no effect")
-    anisotropy = values.constant(node.input("Anisotropy"), node)
+    anisotropy = _anisotropy(node, values)
     facets = rough(roughness, node, values, anisotropy)
     if node.node.fresnel_type == "F82":
         color, edge = values.color(node.input("Base Color")), values.color(node.input("Edge Tint"))

@@ -63,10 +63,15 @@ def _of_opaque_parts(node: Output, values: Values) -> dict[str, Any]:
     if anisotropy > 0:
         # The ratio of the roughnesses α across and along; their product is that without anisotropy.
         made = stretched(values.number(node.input("Roughness")), 1 - 0.9 * anisotropy)
-        if node.has("Tangent") and node.input("Tangent").source():
-            values.warn(node, "Tangent has no effect")
+        warn_of_tangents(node, values)
     weight = product(_positive(values.number(node.input("Specular IOR Level"))), 2.0)
     return made if weight == 1.0 else {**made, "specular_weight": weight}
+
+
+def warn_of_tangents(node: Output, values: Values) -> None:
+    """Highlights are stretched along the coordinates of textures."""
+    if node.has("Tangent") and node.input("Tangent").source():
+        values.warn(node, "Tangent has no effect")
 
 
 def stretched(roughness: Value, ratio: float) -> dict[str, Any]:

@@ -321,6 +321,24 @@ def test_textured_metal_keeps_its_anisotropy(studio, anisotropy):
     assert [along_u, aspect * along_u] == pytest.approx(expected, rel=1e-5)
 
 
+@pytest.mark.parametrize("kind, name, rotation", [
+    (PRINCIPLED, "Anisotropic", "Anisotropic Rotation"), ("ShaderNodeBsdfAnisotropic", "Anisotropy", "Rotation"),
+    ("ShaderNodeBsdfMetallic", "Anisotropy", "Rotation")])
+def test_directions_of_highlights_have_no_effect(studio, kind, name, rotation):
+    from etendue_addon.report import Report
+
+    material, tree, node = studio.material(kind)
+    tree.links.new(tree.nodes.new("ShaderNodeTangent").outputs[0], node.inputs["Tangent"])
+    node.inputs[rotation].default_value = 0.25
+    for anisotropy in (0.0, 0.5):
+        node.inputs[name].default_value = anisotropy
+        report = Report()
+        read(studio, material, report)
+        said = "".join(report.warnings)
+        assert ("Tangent has no effect" in said) == (anisotropy > 0)
+        assert anisotropy == 0 or f"{rotation} has no effect" in said
+
+
 def test_textured_coats_over_other_normals(studio):
     """Their blend by the texture is that by its value."""
     material, tree, node = studio.material(PRINCIPLED, Base_Color=COLOR, Coat_Weight=0.5)
