@@ -15,6 +15,12 @@ public:
     struct AtInfinity {
         uint32_t emitter;  ///< Emitter::index
         GuideFit fit;
+
+        template <class Learned, class Use>
+        static void for_each_field(Learned& learned, const Use& use) {
+            auto& [emitter, fit] = learned;
+            use(emitter), use(fit);
+        }
     };
 
     GuideTree surfaces;

@@ -18,11 +18,11 @@ public:
     uint32_t divide(uint32_t node, int axis, float at) {
         const auto below = uint32_t(nodes_.size());
         nodes_.resize(below + 2);
-        nodes_[node] = {at, uint32_t(axis) & 3, below & 0x3fffffffu};
+        nodes_[node] = {at, below << 2 | uint32_t(axis)};
         return below;
     }
     void set_leaf(uint32_t node, size_t number) {
-        nodes_[node] = {0, kLeaf, uint32_t(number) & 0x3fffffffu};
+        nodes_[node] = {0, uint32_t(number) << 2 | kLeaf};
     }
     /// Divides the whole space at the middles of the boxes that hold items, until each has at most `most` of them or all of its
     /// items have one position. Brings the items into the order of the leaves, stable in each; returns where each leaf begins,
@@ -38,9 +38,9 @@ public:
     /// Number of the leaf that holds `p`.
     size_t leaf(Vec3 p) const {
         uint32_t i = kRoot;
-        while (nodes_[i].axis != kLeaf)
-            i = nodes_[i].child + (p[int(nodes_[i].axis)] >= nodes_[i].split);
-        return nodes_[i].child;
+        while (nodes_[i].axis() != kLeaf)
+            i = nodes_[i].child() + (p[int(nodes_[i].axis())] >= nodes_[i].split);
+        return nodes_[i].child();
     }
 
     size_t memory_bytes() const { return nodes_.capacity() * sizeof(Node); }
@@ -80,8 +80,11 @@ private:
     static constexpr uint32_t kLeaf = 3;
     struct Node {
         float split = 0;
-        uint32_t axis : 2 = kLeaf;
-        uint32_t child : 30 = 0;  ///< The part below the plane, or the number of the leaf.
+        uint32_t child_and_axis = kLeaf;
+
+        uint32_t axis() const { return child_and_axis & 3; }
+        /// The part below the plane, or the number of the leaf.
+        uint32_t child() const { return child_and_axis >> 2; }
     };
     std::vector<Node> nodes_ = std::vector<Node>(1);
 };

@@ -55,6 +55,12 @@ public:
     /// Upper bound of g over the directions of a cone.
     float max_pdf(const GuideView& view, const DirectionCone& cone) const;
 
+    template <class Mixture, class Use>
+    static void for_each_field(Mixture& mixture, const Use& use) {
+        auto& [x, y, z, inv_r, kappa, norm, rho, weight, size] = mixture;
+        use(x), use(y), use(z), use(inv_r), use(kappa), use(norm), use(rho), use(weight), use(size);
+    }
+
 private:
     static constexpr int kLanes = 8;
     using Array = std::array<float, kMostLobes>;

@@ -95,6 +95,12 @@ struct GuideFit {
     std::array<float, kGuideClasses> training_share{};
     float gain =
         0;  ///< Mean of log(guided pdf / unguided pdf) over the light, in nats, at `share`.
+
+    template <class Fit, class Use>
+    static void for_each_field(Fit& fit, const Use& use) {
+        auto& [mixture, share, training_share, gain] = fit;
+        use(mixture), use(share), use(training_share), use(gain);
+    }
 };
 
 /// How the cells of a guide learn.

@@ -33,11 +33,23 @@ struct GuideCell {
         /// Of these walks, by cube_face() of the normal on the side of their arrival; see
         /// GuideTree::set_contributions().
         std::array<WalkContribution, kCubeFaces> contribution{};
+
+        template <class AField, class Use>
+        static void for_each_field(AField& field, const Use& use) {
+            auto& [mixture, share, training_share, contribution] = field;
+            use(mixture), use(share), use(training_share), use(contribution);
+        }
     };
     Vec3 center;
     std::array<Field, 2> fields;
 
     const Field& field(TransportMode mode) const { return fields[size_t(mode)]; }
+
+    template <class Cell, class Use>
+    static void for_each_field(Cell& cell, const Use& use) {
+        auto& [center, fields] = cell;
+        use(center), use(fields);
+    }
 };
 
 class GuideTree {

@@ -263,6 +263,12 @@ private:
         GatherWeightScale weight_scale;
         NextEventCount next_events;
         GatherRoulette roulette;
+
+        template <class State, class Use>
+        static void for_each_field(State& learned, const Use& use) {
+            auto& [radius, gathers, weight_scale, next_events, roulette] = learned;
+            use(radius), use(gathers), use(weight_scale), use(next_events), use(roulette);
+        }
     } learned_;
     PairDensity density_;
     CellCounts loaded_;  ///< The result of cells() until a pass has been made.

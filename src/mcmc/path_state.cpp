@@ -305,12 +305,13 @@ struct SavedVertex {
     Vec3 p, ng, wo;
     Vec2 uv;
     SurfaceLocation location;
-    uint32_t emitter;  ///< Index.
-    float pdf_fwd, transmittance;
-    MediumId medium;
-    Vertex::Kind kind;
-    bool is_delta, is_infinite, has_cosine;
-    uint8_t event;
+    uint32_t emitter = 0;  ///< Index.
+    float pdf_fwd = 0, transmittance = 0;
+    MediumId medium = 0;
+    Vertex::Kind kind{};
+    bool is_delta = false, is_infinite = false, has_cosine = false;
+    uint8_t event = 0;
+    uint8_t zero = 0;  ///< Instead of padding.
 };
 
 }  // namespace
@@ -322,7 +323,6 @@ void PathState::save(LearnedState& to) const {
     const auto none = uint32_t(measure_.scene.emitters().size());
     for (const PathVertex& x : x_) {
         SavedVertex& v = saved.emplace_back();
-        std::memset(static_cast<void*>(&v), 0, sizeof v);  // no random bytes between the fields
         v.p = x.v.p, v.ng = x.v.ng, v.wo = x.v.wo, v.uv = x.v.uv;
         v.location = x.v.location;
         v.emitter = x.v.emitter ? x.v.emitter->index : none;

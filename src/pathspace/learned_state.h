@@ -6,41 +6,47 @@
 #include <cstdint>
 #include <cstring>
 #include <stdexcept>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "math/padding.h"
+
 namespace etendue {
 
-/// Can be read by the same build only, because numbers are stored in their representation in memory.
+/// Can be read by the same build only, because numbers are stored in their representation in memory. Equal states have equal
+/// bytes.
 class LearnedState {
 public:
     template <class T>
     void put(const T& value) {
-        static_assert(std::is_trivially_copyable_v<T>);
-        put_bytes(&value, sizeof(T));
+        for_each_part(value, [&](const auto& part) { put_bytes(&part, sizeof part); });
     }
     template <class T>
     void put(const std::vector<T>& values) {
-        static_assert(std::is_trivially_copyable_v<T>);
         put(uint64_t(values.size()));
-        put_bytes(values.data(), values.size() * sizeof(T));
+        if constexpr (HasNoPadding<T>)
+            put_bytes(values.data(), values.size() * sizeof(T));
+        else
+            for (const T& value : values) put(value);
     }
 
     /// Throws std::runtime_error if fewer bytes are left.
     template <class T>
     void get(T& value) {
-        static_assert(std::is_trivially_copyable_v<T>);
-        get_bytes(&value, sizeof(T));
+        for_each_part(value, [&](auto& part) { get_bytes(&part, sizeof part); });
     }
     template <class T>
     void get(std::vector<T>& values) {
-        static_assert(std::is_trivially_copyable_v<T>);
         uint64_t size = 0;
         get(size);
-        if (size > (bytes_.size() - at_) / sizeof(T)) throw_too_short();
-        values.resize(size_t(size));
-        get_bytes(values.data(), values.size() * sizeof(T));
+        if constexpr (HasNoPadding<T>) {
+            if (size > (bytes_.size() - at_) / sizeof(T)) throw_too_short();
+            values.resize(size_t(size));
+            get_bytes(values.data(), values.size() * sizeof(T));
+        } else {
+            values.clear();
+            for (uint64_t i = 0; i < size; ++i) get(values.emplace_back());
+        }
     }
 
     const std::vector<std::byte>& bytes() const { return bytes_; }

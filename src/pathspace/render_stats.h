@@ -54,6 +54,19 @@ struct RenderStats {
                                            pairs_by_trials.size() - 1)];
     }
     RenderStats& operator+=(const RenderStats& o);
+    /// All numbers; a new one does not compile until it is here.
+    template <class Stats, class Use>
+    static void for_each_field(Stats& stats, const Use& use) {
+        auto& [phases, time_factor, eye_paths, light_paths, vertices, walk_rays, shadow_rays,
+               visible, joins_skipped, pairs, visible_pairs, trials, trial_rays, pairs_by_trials,
+               chains, chain_seeds, chain_trials, chain_rays, bounds_exceeded, runaways, rejected] =
+            stats;
+        (void)time_factor;  // Of the current sample.
+        use(phases), use(eye_paths), use(light_paths), use(vertices), use(walk_rays);
+        use(shadow_rays), use(visible), use(joins_skipped), use(pairs), use(visible_pairs);
+        use(trials), use(chains), use(chain_seeds), use(chain_trials), use(chain_rays);
+        use(trial_rays), use(pairs_by_trials), use(bounds_exceeded), use(runaways), use(rejected);
+    }
     uint64_t rays() const { return walk_rays + shadow_rays + trial_rays + chain_rays; }
 };
 

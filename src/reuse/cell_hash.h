@@ -20,7 +20,7 @@ public:
     };
     /// Has about twice as many buckets as `points`, and cells of width 2·radius, so that a ball of `radius` meets eight
     /// cells.
-    CellHash(size_t points = 0, float radius = 1)
+    constexpr CellHash(size_t points = 0, float radius = 1)
         : inv_width_(0.5f / radius),
           mask_(uint32_t(std::bit_ceil(std::clamp<size_t>(2 * points, 1, size_t(1) << 31)) - 1)) {}
 

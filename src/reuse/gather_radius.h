@@ -78,6 +78,13 @@ public:
             sums.trials[k] += uint64_t(of_pairs * std::min(factor_of_pairs(k), most));
     }
 
+    template <class Radius, class Use>
+    static void for_each_field(Radius& radius, const Use& use) {
+        auto& [seen_radius, radii, is_given, has_inner, eye_paths, time, before, observed] = radius;
+        use(seen_radius), use(radii), use(is_given), use(has_inner), use(eye_paths), use(time),
+            use(before), use(observed);
+    }
+
 private:
     /// Changes a radius, so that an eye path finds `wanted` pairs, not `pairs`.
     void grow(float& radius, double pairs, double wanted, float largest) const;

@@ -46,6 +46,12 @@ public:
     /// pixel, relative to the pixel's luminance.
     static void observe(std::span<const NextEventDraw> draws, double scale, GatherSums& sums);
 
+    template <class Count, class Use>
+    static void for_each_field(Count& count, const Use& use) {
+        auto& [value, before] = count;
+        use(value), use(before);
+    }
+
 private:
     uint32_t value_ = 2;
     GatherTotals before_;

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "math/content_hash.h"
+#include "math/padding.h"
 #include "system/available_memory.h"
 #include "system/output_file.h"
 
@@ -24,7 +25,7 @@ namespace etendue {
 /// Numbers and plain structs of numbers. A bool or an enumerator in a file could have a value that the type has not.
 template <class T>
 concept StoredNumber =
-    std::is_trivially_copyable_v<T> && !std::is_same_v<T, bool> &&
+    HasNoPadding<T> && !std::is_same_v<T, bool> &&
     (!std::is_enum_v<T> || std::is_same_v<T, std::byte>)&&!std::is_pointer_v<T> &&
     !std::is_array_v<T>;
 

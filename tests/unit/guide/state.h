@@ -4,6 +4,8 @@
 #include <cstring>
 #include <vector>
 
+#include "math/padding.h"
+
 namespace etendue::test {
 
 /// Writes and reads as LearnedState does, which belongs to a higher layer.
@@ -13,8 +15,10 @@ struct State {
 
     template <class T>
     void put(const T& value) {
-        const auto* from = reinterpret_cast<const std::byte*>(&value);
-        bytes.insert(bytes.end(), from, from + sizeof(T));
+        for_each_part(value, [&](const auto& part) {
+            const auto* from = reinterpret_cast<const std::byte*>(&part);
+            bytes.insert(bytes.end(), from, from + sizeof part);
+        });
     }
     template <class T>
     void put(const std::vector<T>& values) {
@@ -23,8 +27,10 @@ struct State {
     }
     template <class T>
     void get(T& value) {
-        std::memcpy(&value, &bytes[at], sizeof(T));
-        at += sizeof(T);
+        for_each_part(value, [&](auto& part) {
+            std::memcpy(&part, &bytes[at], sizeof part);
+            at += sizeof part;
+        });
     }
     template <class T>
     void get(std::vector<T>& values) {

@@ -299,6 +299,18 @@ TEST(GuideTree, IsSavedAndLoaded) {
     EXPECT_EQ(tree.gain(kEye), loaded.gain(kEye));
 }
 
+TEST(GuideTree, IsSavedWithoutPadding) {
+    const auto bytes_with = [](int padding) {
+        GuideCell cell{};
+        std::memset(reinterpret_cast<std::byte*>(&cell) + sizeof cell.center, padding,
+                    offsetof(GuideCell, fields) - sizeof cell.center);
+        test::State state;
+        GuideTree(cell).save(state);
+        return state.bytes;
+    };
+    EXPECT_EQ(bytes_with(0x55), bytes_with(0xaa));
+}
+
 TEST(GuideTree, IsTheSameForAnyNumberOfThreads) {
     const std::vector<GuideSample> samples = samples_under_lamp(30000);
     const auto with = [&](size_t threads) {
