@@ -64,7 +64,7 @@ void DenoiseCommand::run() const {
             throw std::runtime_error(fmt::format("\"{}\": {}", input, e.what()));
         }
     };
-    display.write(output, denoised());
+    display.write(output, denoised(), threads);
     if (quiet) return;
     const bool is_guided = std::ranges::any_of(
         image.layers(), [](const std::string& l) { return l.ends_with("albedo"); });

@@ -57,7 +57,7 @@ struct MergeCommand {
         print_warnings(warnings(totals.stats));
         const nlohmann::json report = merging.report(totals);
         if (is_image)
-            display.write(output, image_rows(*totals.film, {}, has_variance, report));
+            display.write(output, image_rows(*totals.film, {}, has_variance, report), 0);
         else
             merging.write(output, totals);
         if (!techniques.empty())

@@ -335,7 +335,7 @@ bool attempt(std::vector<std::string>& failures, const Task& task) {
 void RenderCommand::write_image_somewhere(const ImageRows& image,
                                           std::vector<std::string>& failures) const {
     namespace fs = std::filesystem;
-    if (attempt(failures, [&] { display.write(output, image); })) return;
+    if (attempt(failures, [&] { display.write(output, image, request.threads); })) return;
     const std::string name =
         fmt::format("etendue-{}{}", ::getpid(), fs::path(output).extension().string());
     std::error_code error;
@@ -343,7 +343,8 @@ void RenderCommand::write_image_somewhere(const ImageRows& image,
         const fs::path file = folder / name;
         std::vector<std::string> ignored;
         if (folder.empty() || fs::exists(file, error)) continue;
-        if (!attempt(ignored, [&] { display.write(file.string(), image); })) continue;
+        if (!attempt(ignored, [&] { display.write(file.string(), image, request.threads); }))
+            continue;
         failures.back() += fmt::format("; the image is in {}", file.string());
         return;
     }
@@ -356,7 +357,8 @@ std::vector<std::string> RenderCommand::write_outputs(const Renderer& renderer,
     const bool has_variance = std::find(aovs.begin(), aovs.end(), "variance") != aovs.end();
     const bool has_layers = has_variance || !layers.empty();
     const auto write_layers = [&] {
-        display.write(output, image_rows(renderer.film(), layers, has_variance, report));
+        display.write(output, image_rows(renderer.film(), layers, has_variance, report),
+                      request.threads);
     };
     // The image alone needs the least memory and space. The one with layers replaces it, except in devices and pipes.
     if (is_in_place() && has_layers)
@@ -381,7 +383,8 @@ void RenderCommand::write_denoised(const Job& job, const nlohmann::json& report)
     display.write(
         denoised_file(),
         job.denoiser->denoise(to_image(image_rows(job.renderer->film(), job.guides, false, report)),
-                              job.settings.threads));
+                              job.settings.threads),
+        request.threads);
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
     if (!quiet)
         message("{}: denoised in {} by {}\n", denoised_file(), format_seconds(taken.count()),
@@ -566,9 +569,10 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
                     last_checkpoint.begin(written_state());
                 });
                 write_if_due(images, goes_on, [&] {
-                    display.write(
-                        output, image_rows(renderer.film(), job.layers, has_variance,
-                                           to_json(renderer, s, job.settings, "unfinished", log)));
+                    display.write(output,
+                                  image_rows(renderer.film(), job.layers, has_variance,
+                                             to_json(renderer, s, job.settings, "unfinished", log)),
+                                  request.threads);
                 });
             },
             interrupts.stop, interrupts.drop));

@@ -9,6 +9,7 @@
 
 #include "image/image_io.h"
 #include "number_checks.h"
+#include "system/threads.h"
 #include "usage_error.h"
 
 namespace etendue {
@@ -66,8 +67,9 @@ ToneCurve DisplayOptions::curve(std::vector<float> luminances) const {
             largest};
 }
 
-void DisplayOptions::write(const std::string& path, const ImageRows& image) const {
-    if (image_extension(path) != ".png") return write_image(path, image);
+void DisplayOptions::write(const std::string& path, const ImageRows& image, int threads) const {
+    if (image_extension(path) != ".png")
+        return write_image(path, image, {.threads = thread_count(threads)});
     std::vector<float> luminances;
     luminances.reserve(size_t(image.width) * size_t(image.height));
     for_each_rgb_row(image, [&](int, std::span<const Rgb> row) {

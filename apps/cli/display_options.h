@@ -27,8 +27,10 @@ struct DisplayOptions {
     /// For an image with these luminances.
     ToneCurve curve(std::vector<float> luminances) const;
     /// Writes the image; a .png is mapped first.
-    void write(const std::string& path, const ImageRows& image) const;
-    void write(const std::string& path, const Image& image) const { write(path, rows_of(image)); }
+    void write(const std::string& path, const ImageRows& image, int threads) const;
+    void write(const std::string& path, const Image& image, int threads) const {
+        write(path, rows_of(image), threads);
+    }
 
 private:
     /// Empty for "auto".

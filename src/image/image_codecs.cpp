@@ -11,6 +11,7 @@
 #include <cstring>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <new>
 #include <stdexcept>
 #include <system_error>
@@ -25,6 +26,7 @@
 #include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfStringAttribute.h>
+#include <OpenEXR/ImfThreading.h>
 #include <fmt/format.h>
 #include <jpeglib.h>
 
@@ -574,17 +576,37 @@ std::string encode_png(int width, int height, std::span<const uint8_t> codes) {
     return bytes;
 }
 
-void write_png(OutputFile& file, const ImageRows& image, ExrPrecision) {
+void write_png(OutputFile& file, const ImageRows& image, const WriteOptions&) {
     PngWriter png(write_bytes, &file, image.width, image.height, 3);
     for_each_rgb_row(image,
                      [&](int, std::span<const Rgb> row) { png.add_row(srgb_codes(row).data()); });
     png.end();
 }
 
-void write_exr(OutputFile& file, const ImageRows& image, ExrPrecision precision) {
+namespace {
+
+/// Makes sure that OpenEXR has so many threads, and returns how many a file may use: 0 for those that are soon written or
+/// if there is no memory for threads. They are never ended, because tasks that other files have begun would get lost.
+int exr_threads(int threads, uint64_t values) {
+    constexpr uint64_t kLeast = 1 << 22;
+    if (threads < 2 || values < kLeast) return 0;
+    static std::mutex mutex;
+    const std::lock_guard lock(mutex);
+    try {
+        if (Imf::globalThreadCount() < threads) Imf::setGlobalThreadCount(threads);
+    } catch (const std::system_error&) {
+        return 0;
+    }
+    return threads;
+}
+
+}  // namespace
+
+void write_exr(OutputFile& file, const ImageRows& image, const WriteOptions& options) {
     constexpr float kMaxHalf = 65504;
-    constexpr int kRows = 16;  // which ZIP_COMPRESSION compresses together
-    const bool is_half = precision == ExrPrecision::Half;
+    constexpr int kBlock = 16;  // rows, which ZIP_COMPRESSION compresses together
+    constexpr size_t kMostValues = 1 << 24;
+    const bool is_half = options.precision == ExrPrecision::Half;
     Imf::Header header(image.width, image.height);
     header.compression() = Imf::ZIP_COMPRESSION;
     for (const std::string& name : image.channels)
@@ -596,16 +618,20 @@ void write_exr(OutputFile& file, const ImageRows& image, ExrPrecision precision)
             header.insert(name, Imf::DoubleAttribute(std::get<double>(value)));
     }
     const size_t row = size_t(image.width) * image.channels.size();
-    std::vector<float> values(row * kRows);
+    const int threads = exr_threads(options.threads, row * size_t(image.height));
+    // Two blocks for each thread.
+    const int blocks = std::clamp(int(kMostValues / (row * kBlock)), 1, std::max(1, 2 * threads)),
+              rows = kBlock * blocks;
+    std::vector<float> values(row * size_t(rows));
     std::vector<Half> halves(is_half ? values.size() : 0);
     const size_t size = is_half ? sizeof(Half) : sizeof(float);
     char* const base =
         is_half ? reinterpret_cast<char*>(halves.data()) : reinterpret_cast<char*>(values.data());
     try {
         ExrOutput target(file);
-        Imf::OutputFile out(target, header);
-        for (int begin = 0; begin < image.height; begin += kRows) {
-            const int end = std::min(begin + kRows, image.height);
+        Imf::OutputFile out(target, header, std::min(threads, blocks));
+        for (int begin = 0; begin < image.height; begin += rows) {
+            const int end = std::min(begin + rows, image.height);
             for (int y = begin; y < end; ++y)
                 image.make(y, std::span(values).subspan(size_t(y - begin) * row, row));
             for (size_t i = 0; i < halves.size(); ++i)

@@ -9,8 +9,8 @@ namespace etendue {
 // read_image(), decode_image(), read_pixels(), decode_pixels() and encode_png() of image_io.h, and:
 
 /// Stores all channels and attributes; `image` has any channels. Errors of the file are left to its commit().
-void write_exr(OutputFile& file, const ImageRows& image, ExrPrecision precision);
+void write_exr(OutputFile& file, const ImageRows& image, const WriteOptions& options);
 /// Stores the colours as write_image() does.
-void write_png(OutputFile& file, const ImageRows& image, ExrPrecision);
+void write_png(OutputFile& file, const ImageRows& image, const WriteOptions& options);
 
 }  // namespace etendue

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 }
 
 // Portable float map: rows from the bottom, little-endian where the scale is negative.
-void write_pfm(OutputFile& file, const ImageRows& image, ExrPrecision) {
+void write_pfm(OutputFile& file, const ImageRows& image, const WriteOptions&) {
     static_assert(std::endian::native == std::endian::little);
     const bool is_grey = image.channels.size() == 1;
     const RgbChannels rgb = rgb_channels(image.channels);
@@ -55,7 +55,7 @@ void to_rgbe(const Rgb& c, uint8_t* code) {
     code[3] = uint8_t(exponent + 128);
 }
 
-void write_hdr(OutputFile& file, const ImageRows& image, ExrPrecision) {
+void write_hdr(OutputFile& file, const ImageRows& image, const WriteOptions&) {
     const size_t width = size_t(image.width);
     file.write(fmt::format("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {} +X {}\n", image.height,
                            image.width));
@@ -88,7 +88,7 @@ uint8_t srgb_code(float v) {
 struct Writer {
     const char* extension;
     bool stores_all_channels;
-    void (*write)(OutputFile& file, const ImageRows& image, ExrPrecision precision);
+    void (*write)(OutputFile& file, const ImageRows& image, const WriteOptions& options);
 };
 constexpr Writer kWriters[] = {{".exr", true, write_exr},
                                {".pfm", false, write_pfm},
@@ -154,8 +154,7 @@ void check_image_extension(const std::string& path) {
     writer_for(path);
 }
 
-void write_image(const std::string& path, const ImageRows& image, ExrPrecision precision,
-                 Links links) {
+void write_image(const std::string& path, const ImageRows& image, const WriteOptions& options) {
     const Writer& writer = writer_for(path);
     if (image.width < 1 || image.height < 1 || image.channels.empty())
         fail_write(path, "the image is empty");
@@ -164,8 +163,8 @@ void write_image(const std::string& path, const ImageRows& image, ExrPrecision p
         } catch (const std::runtime_error& e) {
             fail_write(path, e.what());
         }
-    OutputFile file(path, links);
-    writer.write(file, image, precision);
+    OutputFile file(path, options.links);
+    writer.write(file, image, options);
     file.commit();
 }
 

@@ -33,14 +33,20 @@ PixelBuffer decode_pixels(const std::string& bytes, const std::string& name, boo
 
 enum class ExrPrecision { Float, Half };
 
+struct WriteOptions {
+    ExrPrecision precision = ExrPrecision::Float;
+    Links links = Links::Follow;
+    /// Of an .exr file, which they compress. A process that has used several must not write such files after fork().
+    int threads = 1;
+};
+
 /// Writes the format given by the name's extension: .exr stores all channels and attributes; .pfm, .hdr and .png (sRGB,
 /// clamped, NaN as magenta) store the colours of the unnamed layer. The file is an OutputFile. With ExrPrecision::Half
 /// finite values are clamped to the range of half floats.
-void write_image(const std::string& path, const ImageRows& image,
-                 ExrPrecision precision = ExrPrecision::Float, Links links = Links::Follow);
+void write_image(const std::string& path, const ImageRows& image, const WriteOptions& options = {});
 inline void write_image(const std::string& path, const Image& image,
-                        ExrPrecision precision = ExrPrecision::Float, Links links = Links::Follow) {
-    write_image(path, rows_of(image), precision, links);
+                        const WriteOptions& options = {}) {
+    write_image(path, rows_of(image), options);
 }
 
 /// The 8-bit sRGB codes that write_image() stores in a .png: colours are clamped, NaN is magenta.

@@ -29,7 +29,7 @@ void save(const Snapshot& snapshot, const std::string& file, bool replaces) {
     }
     Image image = rgb_image(snapshot.width, snapshot.height, snapshot.mean);
     if (snapshot.report) image.attributes = attributes_of(*snapshot.report);
-    write_image(file, image, ExrPrecision::Float, Links::Replace);
+    write_image(file, image, {.links = Links::Replace});
 }
 
 std::shared_ptr<Snapshot> SnapshotPool::take() {

@@ -85,11 +85,27 @@ TEST_F(ImageIo, ExrIsTheSameFileEachTime) {
     EXPECT_EQ(first, bytes("b.exr"));
 }
 
+TEST_F(ImageIo, ExrIsTheSameFileForAnyNumberOfThreads) {
+    // So large that several threads compress it, with a last block of fewer rows.
+    Image image(1200, 1205, {"R", "G", "B"});
+    for (size_t i = 0; i < image.data.size(); ++i) image.data[i] = float(mix64(i) % 64);
+    for (const ExrPrecision precision : {ExrPrecision::Float, ExrPrecision::Half}) {
+        const auto bytes = [&](int threads) {
+            write_image(file("a.exr"), image, {.precision = precision, .threads = threads});
+            std::ifstream in(file("a.exr"), std::ios::binary);
+            return std::string(std::istreambuf_iterator<char>(in), {});
+        };
+        const std::string one = bytes(1);
+        EXPECT_EQ(read_image(file("a.exr")).data, image.data);
+        for (const int threads : {3, 2, 1}) EXPECT_TRUE(bytes(threads) == one) << threads;
+    }
+}
+
 TEST_F(ImageIo, HalfExrRoundsAndClamps) {
     Image image = sample_image({"R", "G", "B", "A"});
     image.at(0, 0, 0) = 1e6f;
     image.at(1, 0, 0) = 0.1f;
-    write_image(file("a.exr"), image, ExrPrecision::Half);
+    write_image(file("a.exr"), image, {.precision = ExrPrecision::Half});
     const Image read = read_image(file("a.exr"));
     EXPECT_EQ(read.at(0, 0, 0), 65504);
     EXPECT_EQ(read.at(1, 0, 0), 0.0999755859375f);
