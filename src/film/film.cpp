@@ -44,9 +44,9 @@ void Film::set_ranks(const Ranks& ranks) {
     exchanged_.resize(size_t(count * (own_end() - own_begin())));
 }
 
-void Film::begin_pass(uint64_t light_paths, Vec2 offset) {
+void Film::begin_pass(uint64_t light_paths, Vec2 offset, uint64_t key) {
     if (spreads_) grid_ = SampleGrid(geometry_, filter_, offset);
-    pass_.begin(light_paths, spreads_ ? &grid_ : nullptr);
+    pass_.begin(light_paths, spreads_ ? &grid_ : nullptr, key);
     if (pass_.has_splats() && expected_.blocks_.empty()) expected_.average_blocks();
 }
 

@@ -43,8 +43,8 @@ public:
     Film(const Film&) = delete;
     Film& operator=(const Film&) = delete;
 
-    /// Memory of a film, by pixel, without the samples of a grid's margin and the digits of large splats. `groups`: see set_groups(). `has_ranks`: whether
-    /// several processes render the image.
+    /// Memory of a film, by pixel. What a grid needs for the samples of its margin, and a SplatBuffer for large splats, comes
+    /// on top. `groups`: see set_groups(). `has_ranks`: whether several processes render the image.
     static uint64_t bytes_per_pixel(bool has_splats, int groups, bool has_ranks = false) {
         return sizeof(PixelMoments) + sizeof(Rgb) +
                (1 + uint64_t(std::max(groups, 1))) * sizeof(float) +
@@ -98,8 +98,9 @@ public:
     // -- The current pass.
 
     /// `light_paths`: number of light paths of this pass, by which splats are divided; 0 if there are none. `offset`: of
-    /// the film points in their pixels if the film spreads(), uniformly distributed in [0, 1)².
-    void begin_pass(uint64_t light_paths, Vec2 offset = {0.5f, 0.5f});
+    /// the film points in their pixels if the film spreads(), uniformly distributed in [0, 1)². `key`: differs from those of
+    /// other passes; seeds the choice of one pixel for a splat.
+    void begin_pass(uint64_t light_paths, Vec2 offset = {0.5f, 0.5f}, uint64_t key = 0);
     /// Adds the eye path's value (already times PixelSample::weight) of a sample.
     void add_eye(uint64_t index, Rgb value) { pass_.add_eye(index, value); }
     /// Adds the contribution of a light path at a film point, distributed to all pixels whose filter reaches it.

@@ -13,15 +13,15 @@ namespace {
 
 /// Calls `use(pixel, factor)` for one of the pixels whose filter reaches `point`, drawn with probability |h| / Σ|h|. The
 /// factor is Σ|h| with the sign of h, so that each pixel receives h on average. The number that draws it is a hash of
-/// the point, which is random itself.
+/// the point and of the pass: light paths without a random choice reach the same point in all passes.
 template <class Use>
 void for_one_pixel(const FilmGeometry& g, const ReconstructionFilter& filter, Vec2 point,
-                   const Use& use) {
+                   uint64_t key, const Use& use) {
     float sum = 0;
     for_each_pixel(g, filter, point, [&](uint64_t, float h) { sum += std::abs(h); });
     const uint64_t bits =
         uint64_t(std::bit_cast<uint32_t>(point.x)) << 32 | std::bit_cast<uint32_t>(point.y);
-    float left = to_unit_float(uint32_t(mix64(bits))) * sum;
+    float left = to_unit_float(uint32_t(hash_combine(key, bits))) * sum;
     uint64_t chosen = 0;
     float sign = 0;
     for_each_pixel(g, filter, point, [&](uint64_t pixel, float h) {
@@ -35,12 +35,13 @@ void for_one_pixel(const FilmGeometry& g, const ReconstructionFilter& filter, Ve
 
 }  // namespace
 
-void PassImage::begin(uint64_t light_paths, const SampleGrid* grid) {
+void PassImage::begin(uint64_t light_paths, const SampleGrid* grid, uint64_t key) {
     if (light_paths > 0 && !splats_)
         splats_ = std::make_unique<SplatBuffer>(geometry_.crop_width, geometry_.crop_height,
                                                 typical_radiance_);
     splat_scale_ = light_paths > 0 ? float(1.0 / double(light_paths)) : 0.0f;
     grid_ = grid;
+    key_ = key;
 }
 
 void PassImage::add_splat(Vec2 point, Rgb value) {
@@ -53,7 +54,7 @@ void PassImage::add_splat(Vec2 point, Rgb value) {
         const ReachedPixels reached(geometry_, filter_, point);
         splats_->add(reached.column(), reached.row(), value, reached.x(), reached.y());
     } else {
-        for_one_pixel(geometry_, filter_, point,
+        for_one_pixel(geometry_, filter_, point, key_,
                       [&](uint64_t pixel, float h) { splats_->add(pixel, value * h); });
     }
 }

@@ -33,8 +33,8 @@ public:
           samples_(samples) {}
 
     /// `light_paths`: number of light paths of the pass; 0 if there are none. `grid`: the film points of the eye paths,
-    /// if their contributions are spread by the filter.
-    void begin(uint64_t light_paths, const SampleGrid* grid);
+    /// if their contributions are spread by the filter. `key`: of the pass; otherwise the pixels of splats depend on it.
+    void begin(uint64_t light_paths, const SampleGrid* grid, uint64_t key = 0);
     /// Adds to the sample `index`: a point of the grid, or else a pixel.
     void add_eye(uint64_t index, Rgb value) {
         samples_[grid_ ? grid_->place(index) : index] += value;
@@ -71,6 +71,7 @@ private:
     std::vector<Rgb> samples_;             ///< Of the grid, or else of the pixels, row by row.
     std::unique_ptr<SplatBuffer> splats_;  ///< Made by the first pass that has light paths.
     float splat_scale_ = 0;                ///< 1 / N_L
+    uint64_t key_ = 0;
     std::atomic<uint64_t> rejected_{0};
 };
 

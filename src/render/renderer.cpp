@@ -15,6 +15,7 @@
 
 #include "film/parallel_for.h"
 #include "film/thread_arena.h"
+#include "math/hash.h"
 #include "render/method_choice.h"
 #include "render/statistics_section.h"
 #include "sampler/pilot_seed.h"
@@ -363,7 +364,8 @@ public:
     void trace() {
         r_.film_.begin_pass(r_.light_paths_,
                             film_offset(r_.settings_.sampler, numbers_.seed,
-                                        r_.integrator_->eye_paths_of(numbers_.pass)));
+                                        r_.integrator_->eye_paths_of(numbers_.pass)),
+                            hash_combine(numbers_.seed, numbers_.pass));
         r_.integrator_->trace(context());
         r_.kept_pass_ = passes_;
         const std::function<void()>& meanwhile = r_.settings_.meanwhile;

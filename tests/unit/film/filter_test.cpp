@@ -225,6 +225,22 @@ TEST(FilterModeSample, AddsASplatToOnePixel) {
     }
 }
 
+TEST(FilterModeSample, DrawsPixelsAnewInEachPassForTheSamePoint) {
+    const auto f = filter("gaussian");
+    constexpr int kPasses = 4000;
+    constexpr FilmGeometry kSmall{12, 12, 0, 0, 12, 12};
+    Film film(kSmall, f, 1, FilterMode::Sample), spread(kSmall, f, 1, FilterMode::Spread);
+    for (int pass = 0; pass < kPasses; ++pass)
+        for (Film* to : {&film, &spread}) {
+            to->begin_pass(1, {0.5f, 0.5f}, uint64_t(pass));
+            to->add_splat({6.3f, 5.9f}, Rgb(1));
+            to->end_pass();
+        }
+    const auto mean = film.image(), wanted = spread.image();
+    for (size_t i = 0; i < mean.size(); ++i)  // 6 σ
+        EXPECT_NEAR(mean[i].g, wanted[i].g, 6 * std::sqrt(wanted[i].g / kPasses)) << i;
+}
+
 TEST(FilterModeSpread, CountsWhatIsNotFiniteOnce) {
     Film film(kCrop, filter("gaussian"), 1, FilterMode::Spread);
     film.begin_pass(0, {0.3f, 0.4f});
