@@ -1,13 +1,17 @@
 #include "render/aov.h"
 
 #include <algorithm>
+#include <array>
+#include <memory>
 #include <stdexcept>
 
 #include <fmt/format.h>
 
+#include "film/parallel_chunks.h"
 #include "film/parallel_for.h"
 #include "film/thread_arena.h"
 #include "pathspace/walk.h"
+#include "render/renderer.h"
 
 namespace etendue {
 namespace {
@@ -53,35 +57,76 @@ Rgb value(const std::string& name, const Vertex& v, const SubPath& z, const Scen
     return Rgb();
 }
 
-/// average_first_hits(); if `looks_on`, paths continue by pass_delta_surfaces() before `value` is called.
+/// The images of the layers under construction: sums of passes, one at a time.
+class LayerImages {
+public:
+    LayerImages(const Scene& scene, size_t layers, uint64_t samples)
+        : sums_(layers, std::vector<Rgb>(scene.film().pixel_count())) {
+        for (size_t i = 0; i < layers; ++i)
+            passes_.push_back(
+                std::make_unique<PassImage>(scene.film(), scene.filter(), 1, samples));
+    }
+    PassImage& pass(size_t layer) { return *passes_[layer]; }
+    void begin(const SampleGrid* grid) {
+        for (const auto& pass : passes_) pass->begin(0, grid);
+    }
+    /// Adds `factor` times the pass.
+    void end(float factor) {
+        for (size_t layer = 0; layer < sums_.size(); ++layer) {
+            std::vector<Rgb>& sum = sums_[layer];
+            for_film_chunks(sum.size(), [&](uint64_t, uint64_t begin, uint64_t end) noexcept {
+                std::array<Rgb, kFilmChunk> pixels;
+                const std::span<Rgb> of_pass(pixels.data(), size_t(end - begin));
+                passes_[layer]->eye(begin, of_pass);
+                for (uint64_t i = begin; i < end; ++i) sum[i] += of_pass[i - begin] * factor;
+            });
+            passes_[layer]->clear();
+        }
+    }
+    std::vector<std::vector<Rgb>> take() { return std::move(sums_); }
+
+private:
+    std::vector<std::vector<Rgb>> sums_;
+    std::vector<std::unique_ptr<PassImage>> passes_;
+};
+
+/// average_first_hits(); if `looks_on`, paths continue by pass_delta_surfaces() before `value` is called. A ray contributes
+/// to all pixels that the filter reaches, since the weights of its own pixel would be noisy if they have two signs.
 std::vector<std::vector<Rgb>> average_eye_paths(const Scene& scene, size_t layers, int samples,
                                                 uint64_t seed, int threads, bool looks_on,
                                                 const FirstHitValue& value) {
     constexpr int kMostVertices = 16;
-    std::vector<std::vector<Rgb>> images(layers, std::vector<Rgb>(scene.film().pixel_count()));
-    const Film film(scene.film(), scene.filter());
+    constexpr uint64_t kChunk = 256;
+    Film film(scene.film(), scene.filter(), 1, FilterMode::Spread);
+    const uint64_t count = film.sample_count();
+    LayerImages images(scene, layers, count);
     ThreadArena arena(threads);
     arena.execute([&] {
-        parallel_for(scene.film().crop_height, [&](int row) {
-            SubPath z;
-            RenderStats stats;
-            const TechniqueCounts counts;
-            const WalkContext walk{scene, counts, stats, {kMostVertices, kMostVertices}};
-            Sampler sampler(SamplerKind::Sobol, seed);
-            for (int x = 0; x < scene.film().crop_width; ++x) {
-                const uint64_t pixel = uint64_t(row) * scene.film().crop_width + x;
-                for (int i = 0; i < samples; ++i) {
-                    sampler.start(uint32_t(i), pixel);
-                    start_eye_path(walk, film, pixel, sampler, z);
+        for (int i = 0; i < samples; ++i) {
+            const Vec2 offset = film_offset(SamplerKind::Sobol, seed, uint32_t(i));
+            const SampleGrid grid(scene.film(), scene.filter(), offset);
+            film.begin_pass(0, offset);
+            images.begin(film.spreads() ? &grid : nullptr);
+            parallel_for((count + kChunk - 1) / kChunk, [&](uint64_t chunk) {
+                SubPath z;
+                RenderStats stats;
+                const TechniqueCounts counts;
+                const WalkContext walk{scene, counts, stats, {kMostVertices, kMostVertices}};
+                Sampler sampler(SamplerKind::Sobol, seed);
+                const uint64_t end = std::min(count, (chunk + 1) * kChunk);
+                for (uint64_t index = chunk * kChunk; index < end; ++index) {
+                    sampler.start(uint32_t(i), index);
+                    start_eye_path(walk, film, index, sampler, z);
                     if (z.size() < 2 || z[1].kind != Vertex::Kind::Surface) continue;
                     if (looks_on) pass_delta_surfaces(walk, sampler, z);
                     for (size_t layer = 0; layer < layers; ++layer)
-                        images[layer][pixel] += value(z, layer) * (z.film_weight / float(samples));
+                        images.pass(layer).add_eye(index, value(z, layer) * z.film_weight);
                 }
-            }
-        });
+            });
+            images.end(1 / float(samples));
+        }
     });
-    return images;
+    return images.take();
 }
 
 }  // namespace

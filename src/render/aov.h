@@ -25,8 +25,8 @@ struct AovImage {
 };
 /// Eye rays per pixel for the layers of an image.
 inline constexpr int kAovSamples = 16;
-/// Averages over `samples` eye rays per pixel, weighted by the film's filter, for `layers` images: `value(z, layer)` of a
-/// ray whose first surface is z_1, 0 of others.
+/// Averages over `samples` eye rays per pixel, each of which contributes to all pixels that the film's filter reaches, for
+/// `layers` images: `value(z, layer)` of a ray whose first surface is z_1, 0 of others.
 using FirstHitValue = std::function<Rgb(const SubPath& z, size_t layer)>;
 std::vector<std::vector<Rgb>> average_first_hits(const Scene& scene, size_t layers, int samples,
                                                  uint64_t seed, int threads,

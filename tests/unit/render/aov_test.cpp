@@ -66,6 +66,19 @@ TEST(Aov, MirrorsOfNothingAreBlack) {
             EXPECT_TRUE(value.is_zero());
 }
 
+/// Whatever the signs of the filter's weights, and at the edges of the image as well.
+TEST(Aov, UniformSurfacesHaveNoNoise) {
+    for (const char* filter : {"box", "gaussian", "mitchell", "catmullrom", "lanczos"}) {
+        const Scene scene = build(with_filter(kEye, filter) + kWallInFront);
+        for (const AovImage& a :
+             render_aovs(scene, {"albedo", "denoise_albedo", "normal"}, 16, 0, 1))
+            for (const Rgb c : a.pixels) {
+                SCOPED_TRACE(std::string(filter) + " " + a.name);
+                expect_near(c, a.name == "normal" ? Rgb(0, 0, 1) : Rgb(0.5f, 0.25f, 0.8f));
+            }
+    }
+}
+
 /// A coat leaves the colour below it visible.
 TEST(Aov, PlasticShowsItself) {
     const std::string plastic = "<bsdf type=\"plastic\"><rgb name=\"diffuse_reflectance\" "
