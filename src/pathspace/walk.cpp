@@ -284,11 +284,13 @@ bool start_light_path(const WalkContext& walk, Sampler& sampler, SubPath& y) {
     const FinePoint u_y0 = sampler.next_2d_fine();
     const Vec2 u_d = sampler.next_2d();
     EmissionSample e = emitter.sample_emission(u_y0, u_d);
-    if (const GuideFit* fit = guide ? guide->at_infinity(emitter.index) : nullptr)
-        guide_origin(*guide, *fit, emitter, to_float(u_y0), u_d, sampler.next_1d(), e);
+    const GuideFit* const fit = guide ? guide->at_infinity(emitter.index) : nullptr;
+    if (fit) guide_origin(*guide, *fit, emitter, to_float(u_y0), u_d, sampler.next_1d(), e);
     if (!(e.pdf_y0 > 0)) return false;
     Vertex& y0 = append_emitter(walk, emitter, e, y);
-    if (y0.guide) guide_emission(y0, u_d, sampler.next_1d(), e);
+    // Either the origin is guided or the direction. The numbers that follow have the same slots if neither is.
+    const float u_guide = fit ? 0.0f : sampler.next_1d_if(y0.guide != nullptr);
+    if (y0.guide) guide_emission(y0, u_d, u_guide, e);
     leave_emitter(walk, e, sampler, y);
     return true;
 }
@@ -316,14 +318,16 @@ std::optional<BsdfSample> sample_scattering(const WalkContext& walk, Sampler& sa
         v.survival = *q;
         if (!(u_roulette < v.survival.value())) return {};
     }
-    // This is the last slot, because a walk without guide does not read a number here.
-    const float u_guide = v.guide ? sampler.next_1d() : 0.0f;
+    // The numbers that follow have the same slots whether these are needed or not.
+    const float u_guide = sampler.next_1d_if(v.guide != nullptr);
     const auto s = v.sample(u_lobe, u_direction, u_guide, mode);
     const float continued = walk.counts.continued;
-    if (mode == TransportMode::Radiance && continued < 1 && s && v.is_fixed_by_film &&
-        !next_is_fixed_by_film(v, s->is_delta, walk.scene)) {
+    const bool may_end = mode == TransportMode::Radiance && continued < 1 && s &&
+                         v.is_fixed_by_film && !next_is_fixed_by_film(v, s->is_delta, walk.scene);
+    const float u_continued = sampler.next_1d_if(may_end);
+    if (may_end) {
         const Survival both(v.survival.value() * continued);
-        if (!(sampler.next_1d() * v.survival.value() < both.value())) return {};
+        if (!(u_continued * v.survival.value() < both.value())) return {};
         v.survival = both;
     }
     return s;

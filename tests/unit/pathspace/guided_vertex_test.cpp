@@ -1,5 +1,8 @@
 // Directions of guided vertices against their density. False-alarm rate: 0.1 % for each case.
 
+#include <map>
+#include <set>
+
 #include <gtest/gtest.h>
 
 #include "chi2.h"
@@ -371,6 +374,49 @@ TEST(UntrainedGuide, LeavesWalksAsTheyAre) {
         trace_eye_path(guided, film, i % 64, sampler, b);
         expect_same();
     }
+}
+
+/// Records which numbers are read.
+class ReadNumbers final : public PrimarySource {
+public:
+    uint32_t bits(Stream stream, uint64_t vertex, uint32_t slot) override {
+        slots[{stream, vertex}].insert(slot);
+        return uint32_t(hash_combine(uint64_t(stream) << 32 | vertex, slot) >> 32);
+    }
+    std::map<std::pair<Stream, uint64_t>, std::set<uint32_t>> slots;
+};
+
+/// The number that decides at masks is the last one of a vertex. Chains with a guide change it as those without.
+TEST(GuidedWalk, DecidesAtMasksByTheSameNumberAsWithoutGuide) {
+    const std::string veil = test::rectangle(
+        "<scale value=\"0.1\"/>", "<bsdf type=\"mask\"><float name=\"opacity\" value=\"0.5\"/>" +
+                                      test::diffuse("0.5") + "</bsdf>");
+    const Scene scene =
+        test::build(test::front_camera(8) + test::room() + test::area_lamp() + veil);
+    ASSERT_TRUE(scene.has_masks());
+    const Film film(scene.film(), scene.filter());
+    Guide guide = smooth_guide();
+    guide.emission = guide.surfaces;
+    const auto last_slots = [&](const Guide* g) {
+        const TechniqueCounts counts{.hit = 1, .connect = 1, .guide = g};
+        RenderStats stats;
+        const WalkContext walk{scene, counts, stats, {3, 1000}};
+        ReadNumbers numbers;
+        Sampler sampler(numbers);
+        SubPath path;
+        EXPECT_TRUE(start_light_path(walk, sampler, path));
+        EXPECT_EQ(path[0].guide != nullptr, g != nullptr);
+        start_eye_path(walk, film, 27, sampler, path);
+        EXPECT_EQ(path.size(), 2);
+        extend<kEye>(walk, sampler, path);
+        EXPECT_EQ(path[1].guide != nullptr, g != nullptr);
+        std::map<std::pair<Stream, uint64_t>, uint32_t> last;
+        for (const auto& [block, slots] : numbers.slots) last[block] = *slots.rbegin();
+        return last;
+    };
+    const auto without = last_slots(nullptr);
+    EXPECT_EQ(without.size(), 3u);
+    EXPECT_EQ(without, last_slots(&guide));
 }
 
 }  // namespace
