@@ -62,9 +62,9 @@ TechniqueCounts MarkovIntegrator::guided_counts(const Scene& scene) const {
     return n;
 }
 
-PrimarySample MarkovIntegrator::bidirectional_sample(const Scene& scene,
-                                                     const Bidirectional& paths) const {
-    return [&paths, n = guided_counts(scene)](int, const SampleContext& c, Workspace& work) {
+PrimarySample MarkovIntegrator::bidirectional_sample(const Bidirectional& paths,
+                                                     const TechniqueCounts& n) {
+    return [&paths, n](int, const SampleContext& c, Workspace& work) {
         add_bdpt_sample(paths, c, n, work);
     };
 }
@@ -88,7 +88,7 @@ void MarkovIntegrator::use_roulette(const FilmGeometry& film, const Pilot& pilot
 
 WeighedSample MarkovIntegrator::samples_of_paths(const Scene& scene, const Pilot& pilot) {
     finding_paths_.set_roulette(thresholds(scene.film(), pilot));
-    return {bidirectional_sample(scene, finding_paths_), pilot.map};
+    return {bidirectional_sample(finding_paths_, guided_counts(scene)), pilot.map};
 }
 
 void MarkovIntegrator::trace(const PassContext& pass) {
@@ -99,10 +99,15 @@ void MarkovIntegrator::trace(const PassContext& pass) {
             guiding_.train(pass, pilot_paths_.depth(), GuidedWalks::Both, GuidedLight::Indirect);
             set_direct_guide();
             const TechniqueCounts n = guided_direct_counts(pass.scene, pass.light_paths);
-            pilot_ = run_pilot(pass, bidirectional_sample(pass.scene, pilot_paths_),
+            pilot_ = run_pilot(pass, bidirectional_sample(pilot_paths_, guided_counts(pass.scene)),
                                [&](int, const SampleContext& c, Workspace& work) {
                                    add_bdpt_sample(direct_, c, n, work);
                                });
+            if (guiding_.guide() && !guides_large_steps()) {
+                const TechniqueCounts unguided = MarkovIntegrator::counts(pass.scene, 0);
+                pilot_->by_unguided_technique =
+                    unguided_light(pass, bidirectional_sample(pilot_paths_, unguided), *pilot_);
+            }
         }
         Chains chains = begin(pass, *pilot_);
         pool_ = chains.pool;

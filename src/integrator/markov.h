@@ -77,6 +77,8 @@ protected:
         double large_step = 1;
     };
     virtual Chains begin(const PassContext& pass, const Pilot& pilot) = 0;
+    /// Whether the walks of large steps are guided, as those of the pilot; otherwise it has their light by technique apart.
+    virtual bool guides_large_steps() const { return true; }
     /// Makes the steps of a pass.
     virtual void advance(const PassContext& pass, const StateSpace&, ChainGroups& groups) {
         groups.advance(pass);
@@ -88,7 +90,7 @@ protected:
     /// The counts of samples of bidirectional path tracing, whose walks are guided.
     TechniqueCounts guided_counts(const Scene& scene) const;
     /// A sample of all techniques of `bdpt`, with the walks of `paths`.
-    PrimarySample bidirectional_sample(const Scene& scene, const Bidirectional& paths) const;
+    static PrimarySample bidirectional_sample(const Bidirectional& paths, const TechniqueCounts& n);
     /// Samples of all techniques as states of the single paths of which they consist. Walks and joins have Russian roulette,
     /// as in pssmlt, since most joins of long walks have a small part of the target.
     WeighedSample samples_of_paths(const Scene& scene, const Pilot& pilot);

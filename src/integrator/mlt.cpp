@@ -37,7 +37,8 @@ protected:
             PathMeasure(scene, reached_region(scene.film(), scene.filter()), kShortest, longest),
             weighted_luminance(pilot.map), LengthChoice(kShortest, longest, pilot.by_technique),
             TechniqueChoice(scene, kShortest, std::min(kTabulated, longest - kShortest + 1),
-                            pilot.by_technique)};
+                            pilot.by_unguided_technique.empty() ? pilot.by_technique
+                                                                : pilot.by_unguided_technique)};
         const ClassPlan plan{.chains = options_.chains, .c = pilot.constant()};
         PathMutations mutations;
         if (!user_paths_.empty()) {
@@ -54,6 +55,8 @@ protected:
                                                            samples_of_paths(scene, pilot)),
                                {plan}, pool_samples(pilot.precise_samples, options_));
     }
+
+    bool guides_large_steps() const override { return false; }
 
 private:
     std::string user_paths_;  ///< File; empty: none.

@@ -20,10 +20,10 @@ protected:
     Chains begin(const PassContext& pass, const Pilot& pilot) override {
         use_roulette(pass.scene.film(), pilot);
         const ClassPlan plan{.chains = options_.chains, .c = pilot.constant()};
-        return {
-            std::make_unique<PrimarySpace>(1, bidirectional_sample(pass.scene, paths_), pilot.map),
-            {plan},
-            pool_samples(pilot.precise_samples, options_)};
+        return {std::make_unique<PrimarySpace>(
+                    1, bidirectional_sample(paths_, guided_counts(pass.scene)), pilot.map),
+                {plan},
+                pool_samples(pilot.precise_samples, options_)};
     }
 };
 

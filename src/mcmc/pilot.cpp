@@ -74,11 +74,13 @@ void Pilot::save(LearnedState& to) const {
     to.put(typical);
     to.put(samples);
     to.put(precise_samples);
-    to.put(uint64_t(by_technique.size()));
-    for (const auto& [technique, value] : by_technique) {
-        to.put(technique.first);
-        to.put(technique.second);
-        to.put(value);
+    for (const TechniqueLight* light : {&by_technique, &by_unguided_technique}) {
+        to.put(uint64_t(light->size()));
+        for (const auto& [technique, value] : *light) {
+            to.put(technique.first);
+            to.put(technique.second);
+            to.put(value);
+        }
     }
 }
 
@@ -91,19 +93,38 @@ void Pilot::load(LearnedState& from) {
     from.get(typical);
     from.get(samples);
     from.get(precise_samples);
-    uint64_t techniques = 0;
-    from.get(techniques);
-    by_technique.clear();
-    for (uint64_t i = 0; i < techniques; ++i) {
-        std::pair<int, int> technique;
-        from.get(technique.first);
-        from.get(technique.second);
-        from.get(by_technique[technique]);
+    for (TechniqueLight* light : {&by_technique, &by_unguided_technique}) {
+        uint64_t techniques = 0;
+        from.get(techniques);
+        light->clear();
+        for (uint64_t i = 0; i < techniques; ++i) {
+            std::pair<int, int> technique;
+            from.get(technique.first);
+            from.get(technique.second);
+            from.get((*light)[technique]);
+        }
     }
 }
 
 uint64_t pool_samples(uint64_t precise_samples, const ChainOptions& options) {
     return std::max(precise_samples / 4, uint64_t(4 * options.chains));
+}
+
+TechniqueLight unguided_light(const PassContext& pass, const PrimarySample& unguided,
+                              const Pilot& pilot) {
+    const uint64_t seed = hash_combine(pilot_seed(pass.seed, PilotUse::Chains), 1);
+    std::vector<PilotSplats> drawn(pilot.precise_samples);
+    pass.for_each_other_path(drawn.size(), [&](uint64_t i, Sampler&, Workspace& work) {
+        const WholeFilm whole(pass);
+        NumberTable numbers;
+        NumberSource source(NumberStep::Fresh, hash_combine(seed, i), nullptr, &numbers);
+        drawn[i] = draw(pass, unguided, source, {whole.sample, work});
+    });
+    TechniqueLight light;
+    for (const PilotSplats& splats : drawn)
+        for (const PilotSplat& s : splats)
+            light[{s.edges, s.s}] += double(s.luminance) * pilot.map(s.film) / double(drawn.size());
+    return light;
 }
 
 Pilot run_pilot(const PassContext& pass, const PrimarySample& sample, const PrimarySample& direct) {

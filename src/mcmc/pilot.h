@@ -19,6 +19,8 @@ struct Pilot {
     uint64_t samples = 0;
     uint64_t precise_samples = 0;  ///< Those that sufficed for b; the others improve the map.
     TechniqueLight by_technique;   ///< Mean of the target.
+    /// The same of samples without guide, see unguided_light(); empty unless it was called.
+    TechniqueLight by_unguided_technique{};
 
     /// The constant c of chains (chain.h): b. If the pilot found nothing, large steps alone find light, and count as
     /// independent samples.
@@ -32,6 +34,11 @@ struct Pilot {
 /// doubled until there is one for each pixel and the relative standard error of b is at most 2 %; at most two samples per
 /// pixel, and 2^18 in total.
 Pilot run_pilot(const PassContext& pass, const PrimarySample& sample, const PrimarySample& direct);
+
+/// The light by technique of `unguided` samples, as many as the pilot needed for b: a guide makes other techniques good than
+/// those of walks without it.
+TechniqueLight unguided_light(const PassContext& pass, const PrimarySample& unguided,
+                              const Pilot& pilot);
 
 /// Number of samples in the pool of a group: a quarter of Pilot::precise_samples, and at least four for each chain.
 uint64_t pool_samples(uint64_t precise_samples, const ChainOptions& options);
