@@ -275,7 +275,8 @@ void add_compare_command(CLI::App& app) {
     auto command = std::make_shared<CompareCommand>();
     CLI::App& c = *app.add_subcommand(
         "compare", "Compare methods at equal time or equal samples, and write a report");
-    c.add_option("SCENE", command->scenes, "Scene files (.xml, .pbrt, .gltf, .glb)")->required();
+    c.add_option("SCENE", command->scenes, "Scene files (.xml, .pbrt, .gltf, .glb, .usd)")
+        ->required();
     c.add_option("-m,--methods", command->methods,
                  "Integrators with parameters: path 'bdpt:max_depth=8'; efficiencies are relative "
                  "to the first")

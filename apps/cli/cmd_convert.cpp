@@ -72,7 +72,8 @@ void add_convert_command(CLI::App& app) {
     };
     auto options = std::make_shared<Options>();
     CLI::App& c = *app.add_subcommand("convert", "Write a scene as XML of Mitsuba 3");
-    c.add_option("SCENE", options->scene.file, "Scene file (.xml, .pbrt, .gltf, .glb)")->required();
+    c.add_option("SCENE", options->scene.file, "Scene file (.xml, .pbrt, .gltf, .glb, .usd)")
+        ->required();
     c.add_option("OUTPUT", options->output,
                  "XML file to write; meshes and images go to a folder beside it")
         ->required();

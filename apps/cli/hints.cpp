@@ -1,13 +1,13 @@
 #include "hints.h"
 
 #include <algorithm>
-#include <array>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "description/scene_description.h"
 #include "integrator/integrator.h"
+#include "readers/scene_file.h"
 
 namespace etendue {
 namespace {
@@ -48,11 +48,6 @@ std::vector<std::string> commands_of(const CLI::App& app) {
 
 std::string did_you_mean(const std::string& text) {
     return text.empty() ? "" : fmt::format("; did you mean \"{}\"?", text);
-}
-
-bool is_scene_file(const std::string& word) {
-    return std::ranges::any_of(std::array{".xml", ".pbrt", ".gltf", ".glb"},
-                               [&](const char* extension) { return word.ends_with(extension); });
 }
 
 std::string meant_command(const std::string& word, const std::vector<std::string>& commands) {
@@ -116,8 +111,8 @@ std::vector<std::string> with_usual_words(const CLI::App& app, std::vector<std::
     const auto is_command = [&](const std::string& a) {
         return std::ranges::find(commands, a) != commands.end();
     };
-    if (is_scene_file(arguments[0]) ||
-        (arguments[0].starts_with('-') && std::ranges::any_of(arguments, is_scene_file) &&
+    if (is_scene_file_name(arguments[0]) ||
+        (arguments[0].starts_with('-') && std::ranges::any_of(arguments, is_scene_file_name) &&
          std::ranges::none_of(arguments, is_command)))
         arguments.insert(arguments.begin(), "render");
     if (arguments[0] == "version") arguments[0] = "--version";

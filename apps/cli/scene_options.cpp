@@ -39,7 +39,7 @@ std::vector<int> parse_integers(const std::string& text, char separator, size_t 
 }  // namespace
 
 void SceneOptions::add_to(CLI::App& command) {
-    command.add_option("SCENE", file, "Scene file (.xml, .pbrt, .gltf, .glb)")->required();
+    command.add_option("SCENE", file, "Scene file (.xml, .pbrt, .gltf, .glb, .usd)")->required();
     add_reading_options(command);
 }
 

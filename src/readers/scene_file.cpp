@@ -8,8 +8,44 @@
 #include "readers/gltf.h"
 #include "readers/mitsuba_xml.h"
 #include "readers/pbrt.h"
+#include "readers/usd.h"
 
 namespace etendue {
+namespace {
+
+/// Files with one ending.
+struct Kind {
+    const char* extension;
+    const char* name;
+    SceneDescription (*read)(const std::string&, const ReadOptions&);
+    bool has_no_parameters = false;
+};
+constexpr Kind kKinds[] = {{".xml", "Mitsuba", read_mitsuba_xml},
+                           {".pbrt", "pbrt", read_pbrt, true},
+                           {".gltf", "glTF", read_gltf, true},
+                           {".glb", "glTF", read_gltf, true},
+                           {".usd", "USD", read_usd},
+                           {".usda", "USD", read_usd},
+                           {".usdc", "USD", read_usd},
+                           {".usdz", "USD", read_usd}};
+
+/// The one before ".gz".
+std::string extension_of(std::filesystem::path path) {
+    if (path.extension() == ".gz") path = path.stem();
+    return path.extension().string();
+}
+
+const Kind* find_kind(const std::string& extension) {
+    for (const Kind& kind : kKinds)
+        if (kind.extension == extension) return &kind;
+    return nullptr;
+}
+
+}  // namespace
+
+bool is_scene_file_name(const std::string& file) {
+    return find_kind(extension_of(file)) != nullptr;
+}
 
 void check_scene_file(const std::string& file) {
     if (!std::filesystem::exists(file))
@@ -20,29 +56,16 @@ void check_scene_file(const std::string& file) {
 
 SceneDescription read_scene_file(const std::string& file, const ReadOptions& options) {
     check_scene_file(file);
-    std::filesystem::path path = file;
-    if (path.extension() == ".gz") path = path.stem();
-    const std::string extension = path.extension().string();
-    const auto read = [&](SceneDescription (*reader)(const std::string&, const ReadOptions&)) {
-        return read_in_memory(file, [&] { return reader(file, options); });
-    };
-    if (extension == ".xml") return read(read_mitsuba_xml);
-    if (extension == ".pbrt") {
-        if (!options.defines.empty()) throw UnusedDefines("scenes of pbrt have no parameters");
-        return read(read_pbrt);
-    }
-    if (extension == ".gltf" || extension == ".glb") {
-        if (!options.defines.empty()) throw UnusedDefines("scenes of glTF have no parameters");
-        return read(read_gltf);
-    }
-    if (extension.starts_with(".usd"))
-        throw std::runtime_error(fmt::format("{}: stages of USD are read by the Python package: "
-                                             "python -m etendue.usd {} scene.xml",
-                                             file, file));
-    throw std::runtime_error(
-        fmt::format("{}: unknown kind of scene file \"{}\" (known: .xml, of Mitsuba 0.6 and 3; "
-                    ".pbrt, of pbrt-v3 and v4; .gltf and .glb)",
-                    file, extension));
+    const std::string extension = extension_of(file);
+    const Kind* kind = find_kind(extension);
+    if (!kind)
+        throw std::runtime_error(
+            fmt::format("{}: unknown kind of scene file \"{}\" (known: .xml, of Mitsuba 0.6 and 3; "
+                        ".pbrt, of pbrt-v3 and v4; .gltf and .glb; .usd, .usda, .usdc and .usdz)",
+                        file, extension));
+    if (kind->has_no_parameters && !options.defines.empty())
+        throw UnusedDefines(fmt::format("scenes of {} have no parameters", kind->name));
+    return read_in_memory(file, [&] { return kind->read(file, options); });
 }
 
 }  // namespace etendue

@@ -125,10 +125,158 @@ TEST_F(ConvertTest, ScenesForMitsuba3) {
     EXPECT_NE(xml.find("<integrator type=\"volpath\""), xml.npos);
 }
 
-TEST_F(ConvertTest, SaysHowStagesOfUsdAreRead) {
-    const ProgramResult r = run({"convert", write("stage.usda", "#usda 1.0\n"), "scene.xml"});
-    EXPECT_EQ(r.status, 1);
-    EXPECT_NE(r.errors.find("python -m etendue.usd"), std::string::npos) << r.errors;
+/// A Python that is a shell script: `python3` of a virtual environment, with the arguments of the command in "$@".
+class StageTest : public ConvertTest {
+protected:
+    void SetUp() override {
+        write("stage.usda", "#usda 1.0\n");
+        setenv("VIRTUAL_ENV", (folder.path() / "venv").c_str(), 1);
+        setenv("TMPDIR", (folder.path() / "tmp").c_str(), 1);
+        setenv("PATH", (folder.path() / "none").c_str(), 1);
+        fs::create_directories(folder.path() / "tmp");
+    }
+    void TearDown() override {
+        unsetenv("VIRTUAL_ENV");
+        unsetenv("TMPDIR");
+        setenv("PATH", path.c_str(), 1);
+    }
+    void python(const std::string& script) const {
+        fs::create_directories(folder.path() / "venv/bin");
+        const std::string file =
+            write("venv/bin/python3", "#!/bin/sh\nPATH=" + path + "\n" + script);
+        fs::permissions(file, fs::perms::owner_all);
+    }
+    /// Without what a test leaves behind.
+    void expect_no_temporary_files() const { EXPECT_TRUE(fs::is_empty(folder.path() / "tmp")); }
+    /// Of a script that writes a scene with a mesh and an image of its own, and another image of the stage.
+    std::string writes_scene() const {
+        write("wood.pfm", "Pf\n1 1\n-1\n" + std::string(4, '\0'));
+        const std::string picture =
+            write("picture.pfm", "Pf\n1 1\n-1\n" + std::string("\0\0\0?", 4));
+        return R"(
+for out; do :; done
+mkdir "$(dirname "$out")/scene_files"
+cp ")" + picture +
+               R"(" "$(dirname "$out")/scene_files/image0.pfm"
+cat >"$(dirname "$out")/scene_files/mesh0.ply" <<END
+ply
+format ascii 1.0
+element vertex 3
+property float x
+property float y
+property float z
+element face 1
+property list uchar int vertex_indices
+end_header
+-1 -1 0
+1 -1 0
+0 1 0
+3 0 1 2
+END
+cat >"$out" <<END
+<scene version="3.0.0"><integrator type="path"/><emitter type="constant"/>
+<sensor type="perspective" id="/Camera"><transform name="to_world"><lookat origin="0, 0, 4" target="0, 0, 0" up="0, 1, 0"/>
+</transform></sensor>
+<shape type="ply" id="/A"><string name="filename" value="scene_files/mesh0.ply"/><bsdf type="diffuse">
+<texture name="reflectance" type="bitmap"><string name="filename" value="scene_files/image0.pfm"/></texture></bsdf></shape>
+<shape type="rectangle" id="/B"><bsdf type="diffuse">
+<texture name="reflectance" type="bitmap"><string name="filename" value=")" +
+               (folder.path() / "wood.pfm").string() + R"("/></texture></bsdf></shape></scene>
+END
+echo "warning: stage.usda: /C: has no effect" >&2
+)";
+    }
+
+private:
+    std::string path = std::getenv("PATH");
+};
+
+TEST_F(StageTest, AreConvertedAndRenderedByThePythonPackage) {
+    python(writes_scene());
+    const std::string out = folder.path() / "out/scene.xml";
+    const ProgramResult r = run({"convert", folder.path() / "stage.usda", out});
+    ASSERT_EQ(r.status, 0) << r.errors;
+    EXPECT_EQ(r.errors, "warning: stage.usda: /C: has no effect\n");
+    expect_no_temporary_files();
+    const std::string xml = read_text(out);
+    EXPECT_NE(xml.find("value=\"../wood.pfm\""), xml.npos) << xml;
+    EXPECT_NE(xml.find("scene_files/image0.pfm"), xml.npos) << xml;
+    EXPECT_EQ(xml.find(folder.path() / "tmp"), xml.npos) << xml;
+    const std::vector<Rgb> a = render(folder.path() / "stage.usda"), b = render(out);
+    ASSERT_EQ(a.size(), b.size());
+    for (size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].g, b[i].g);
+    expect_no_temporary_files();
+}
+
+TEST_F(StageTest, NeedNoCommandAndMayHaveAnyName) {
+    python(writes_scene());
+    const std::string name = write("-a b'\"$HOME;&.usda", "#usda 1.0\n");
+    const std::string image = folder.path() / "image.pfm";
+    const ProgramResult r =
+        run({name, "-o", image, "--quiet", "--spp", "1", "--resolution", "4x4"});
+    EXPECT_EQ(r.status, 0) << r.errors;
+    EXPECT_TRUE(fs::exists(image));
+}
+
+TEST_F(StageTest, ArgumentsGoToTheCommand) {
+    const std::string words = folder.path() / "words.txt";
+    python("shift 2\nprintf '[%s]' \"$@\" >" + words + "\n" + writes_scene());
+    const ProgramResult r =
+        run({"convert", folder.path() / "stage.usda", "--lenient", "-D", "/A/B:paint=light red",
+             "-D", "time=3", "-D", "purpose=a,b", folder.path() / "out.xml"});
+    ASSERT_EQ(r.status, 0) << r.errors;
+    const std::string text = read_text(words);
+    EXPECT_TRUE(text.starts_with("[--variant=/A/B:paint=light red][--purpose=a][--purpose=b]"
+                                 "[--time=3][--lenient][--][" +
+                                 (folder.path() / "stage.usda").string() + "][" +
+                                 (folder.path() / "tmp").string()))
+        << text;
+    const ProgramResult unknown = run({"info", folder.path() / "stage.usda", "-D", "spp=3"});
+    EXPECT_EQ(unknown.status, 1);
+    EXPECT_NE(unknown.errors.find("scenes of USD have no parameter \"spp\""), std::string::npos)
+        << unknown.errors;
+}
+
+TEST_F(StageTest, FailuresSayWhyAndReplaceNothing) {
+    const std::string stage = folder.path() / "stage.usda", out = write("out.xml", "kept");
+    const auto errors = [&] {
+        const ProgramResult r = run({"convert", stage, out});
+        EXPECT_EQ(r.status, 1);
+        EXPECT_EQ(read_text(out), "kept");
+        expect_no_temporary_files();
+        return r.errors;
+    };
+    EXPECT_NE(errors().find("which needs a python3 in PATH"), std::string::npos) << errors();
+    python("echo \"$0: No module named etendue.usd\"; exit 1");
+    EXPECT_NE(errors().find("cannot be used ("), std::string::npos) << errors();
+    EXPECT_NE(errors().find("pip install '.[usd]'"), std::string::npos) << errors();
+    python("echo 'Traceback'; echo 'RuntimeError: no stage: pip install usd-core'; exit 1");
+    EXPECT_NE(errors().find("python3: no stage: pip install usd-core)"), std::string::npos)
+        << errors();
+    python("echo 'warning: w'; echo 'etendue.usd: " + stage + ": /A: is wrong'; exit 1");
+    EXPECT_EQ(errors(), "etendue: " + stage + ": /A: is wrong\n");
+    python("kill -9 $$");
+    EXPECT_NE(errors().find("ended with the status 137"), std::string::npos) << errors();
+    python("exit 0");
+    EXPECT_NE(errors().find("scene.xml"), std::string::npos) << errors();
+    write("venv/bin/python3", "#!/none\n");
+    EXPECT_NE(errors().find("cannot start"), std::string::npos) << errors();
+}
+
+TEST_F(StageTest, SignalsLeaveNothingBehind) {
+    const std::string begun = folder.path() / "begun";
+    python("touch " + begun + "; exec sleep 60");
+    for (const int signal : {SIGINT, SIGTERM}) {
+        fs::remove(begun);
+        const Program program(ETENDUE_PROGRAM,
+                              {"convert", folder.path() / "stage.usda", folder.path() / "out.xml"},
+                              folder.path());
+        while (!fs::exists(begun)) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        program.send(signal);
+        const ProgramResult r = program.wait();
+        EXPECT_TRUE(signal == SIGINT ? r.status == 130 : r.signal == SIGTERM) << r.errors;
+        expect_no_temporary_files();
+    }
 }
 
 TEST_F(ConvertTest, RefusesOutputsThatWouldDoHarm) {

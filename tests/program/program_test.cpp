@@ -116,6 +116,17 @@ TEST_F(LongBrokenInputs, AllAreRefused) {
     expect_refusals(1);
 }
 
+TEST_F(ProgramTest, FilesOfAllReadersNeedNoCommand) {
+    for (const char* name : {"a.xml", "a.xml.gz", "a.pbrt", "a.pbrt.gz", "a.gltf", "a.glb", "a.usd",
+                             "a.usda", "a.usdc", "a.usdz"})
+        for (const auto& arguments : {std::vector<std::string>{name, "-o", "a.png"},
+                                      std::vector<std::string>{"-o", "a.png", name}}) {
+            const ProgramResult r = run(arguments);
+            EXPECT_EQ(r.status, 1);
+            EXPECT_EQ(r.errors, fmt::format("etendue: {}: there is no such file\n", name));
+        }
+}
+
 TEST_F(ProgramTest, NamesTheCommandThatIsMeant) {
     const auto refused = [&](const std::vector<std::string>& arguments,
                              const std::string& message) {

@@ -369,6 +369,25 @@ def test_usd_core_is_named_where_it_is_missing(tmp_path: Path) -> None:
     assert 'RuntimeError: USD files are read by the package usd-core: pip install usd-core' in failed.stderr
 
 
+def test_the_program_reads_stages(tmp_path: Path, program: str) -> None:
+    text = VARIANTS + TWO_BALLS
+    file, out, picture = write(tmp_path, text), tmp_path / "out.xml", tmp_path / "out.pfm"
+    choice = ["-D", "/Thing:form=box"]
+    method = ["-i", "path:max_depth=3", "--spp", "8", "--seed", "1", "--resolution", "16x12", "--quiet"]
+    subprocess.run([program, "convert", "--keep-plugins", file, out, *choice], check=True)
+    subprocess.run([program, file, "-o", picture, *choice, *method], check=True)
+    expected = image(load(tmp_path, text, variants={"/Thing": {"form": "box"}}))
+    expect_same(image(et.load(out)), expected, 1e-5)
+    expect_same(et.read_image(picture), expected, 1e-5)
+    wrong = write(tmp_path, 'def Mesh "M" { int[] faceVertexCounts = [3] }', name="wrong.usda")
+    reasons = []
+    for command in ([program, "convert", wrong, out], [sys.executable, "-m", "etendue.usd", wrong, out]):
+        failed = subprocess.run(command, capture_output=True, text=True)
+        assert failed.returncode == 1
+        reasons.append(failed.stderr.split(": ", 1)[1])
+    assert reasons[0] == reasons[1]
+
+
 def test_the_command_writes_xml(tmp_path: Path) -> None:
     text = VARIANTS + TWO_BALLS + """
         def Mesh "Quad" { int[] faceVertexCounts = [4]
