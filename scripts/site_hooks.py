@@ -18,9 +18,9 @@ PYTHON = """# The Python package
 
 ::: etendue
     options:
-      members: [load, load_dict, load_string, render, resume, merge, start, compare, verify, read_image, write_image, tonemap,
+      members: [load, load_dict, load_string, render, render_sensors, resume, merge, start, compare, verify, read_image, write_image, tonemap,
         denoise, diff, show, plugins, integrator, limit_memory, look_at, rotate, scale, translate, Result, Job, Progress,
-        FilmView, RayHits, Diff, CompareReport, VerifyReport, Integrator, RenderError]
+        FilmView, RayHits, SensorRays, Bsdfs, BsdfSamples, Diff, CompareReport, VerifyReport, Integrator, RenderError]
 
 ## The compiled classes
 

@@ -29,16 +29,18 @@ from ._job import Job, start
 from ._memory import limit_memory
 from ._method import integrator
 from ._rays import RayHits
-from ._render import FilmView, Progress, RenderError, Result, merge, render, resume
+from ._render import FilmView, Progress, RenderError, Result, merge, render, render_sensors, resume
 from ._reports import CompareReport, VerifyReport, compare, verify, verify_images
 from ._scenes import (load, load_dict, load_string, look_at, plugins, rotate, scale, translate)
+from ._scattering import Bsdfs, BsdfSamples, SensorRays
 from ._show import show
 
 SceneError.__module__ = "etendue"
 
 __all__ = [
-    "CompareReport", "Description", "Diff", "FilmView", "Integrator", "Job", "Progress", "RayHits", "RenderError", "Result",
-    "Scene", "SceneError", "VerifyReport", "compare", "core", "denoise", "diff", "integrator", "limit_memory", "load",
-    "load_dict", "load_string", "look_at", "merge", "plugins", "read_image", "render", "resume", "rotate", "scale", "show",
-    "start", "tonemap", "translate", "verify", "verify_images", "write_image",
+    "BsdfSamples", "Bsdfs", "CompareReport", "Description", "Diff", "FilmView", "Integrator", "Job", "Progress", "RayHits",
+    "RenderError", "Result", "Scene", "SceneError", "SensorRays", "VerifyReport", "compare", "core", "denoise", "diff",
+    "integrator", "limit_memory", "load", "load_dict", "load_string", "look_at", "merge", "plugins", "read_image", "render",
+    "render_sensors", "resume", "rotate", "scale", "show", "start", "tonemap", "translate", "verify", "verify_images",
+    "write_image",
 ]

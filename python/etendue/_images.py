@@ -46,6 +46,9 @@ def _decoded(codes: NDArray[np.uint8]) -> NDArray[np.float64]:
 def read_image(file: str | PathLike[str], layer: str = "") -> Image:
     """Reads an image of radiance: .exr, .hdr, .pfm, .png (decoded from sRGB) or .jpg. Linear RGB, shape (H, W, 3).
 
+        image = et.read_image("a.exr")
+        albedo = et.read_image("albedo.exr")
+
     layer: this layer of an .exr, such as "albedo", instead of the image.
 
     Raises RuntimeError if the file cannot be read or has no such layer.
@@ -57,6 +60,9 @@ def write_image(file: str | PathLike[str], image: ArrayLike) -> None:
     """Writes linear RGB of shape (H, W, 3) as .exr, .pfm, .hdr or .png (sRGB, clamped to [0, 1]); or 8-bit sRGB codes of
     that shape, as tonemap() makes them, as .png. Missing folders are created. An existing file is replaced only when the
     new one is complete.
+
+        et.write_image("copy.exr", image)
+        et.write_image("picture.png", et.tonemap(image, exposure=1))
 
     Raises RuntimeError for another extension or if the file cannot be written, and ValueError for another shape.
     """
@@ -73,6 +79,9 @@ def write_image(file: str | PathLike[str], image: ArrayLike) -> None:
 def denoise(image: Any, albedo: ImageLike | None = None, normal: ImageLike | None = None, *, threads: int = 0) -> Image:
     """Removes the noise of an image by Intel Open Image Denoise. The result is radiance, shape (H, W, 3). It has a bias, so
     that it is no reference and no evidence: see docs/denoising.md.
+
+        result = et.render(scene, "bdpt", spp=64, filter_mode="sample", aovs=["denoise_albedo", "denoise_normal"])
+        et.write_image("clean.exr", et.denoise(result))
 
     image: a Result, which should be rendered with filter_mode="sample", and whose auxiliary images are used; or an array of
         radiance, shape (H, W, 3), or its file.
@@ -99,6 +108,9 @@ def tonemap(
     image: ImageLike, operator: ToneOperator = "aces", *, exposure: float = 0, white: float = 0
 ) -> NDArray[np.uint8]:
     """Converts radiance, shape (H, W, 3), for displays: 8-bit sRGB codes of the same shape, as `etendue tonemap`.
+
+        codes = et.tonemap(result, "reinhard", exposure=-1)
+        et.write_image("picture.png", codes)
 
     operator: "aces", "reinhard", or "srgb", which only clamps.
     exposure: in stops; radiance is multiplied by 2^exposure first.
@@ -134,6 +146,9 @@ def diff(
 ) -> Diff:
     """Compares an image with a reference of the same shape (H, W, 3), as `etendue diff`. Images are arrays, files or
     Results, in linear RGB; arrays of uint8 are sRGB codes.
+
+        errors = et.diff(image, reference)
+        print(errors["rel_mse"], errors.flip_map.max())
 
     reference2: a second, independent reference. Squared errors are then (X - R1)(X - R2), so that the noise of the
         references cancels on average.

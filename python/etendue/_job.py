@@ -232,6 +232,8 @@ def start(
 ) -> Job:
     """Starts a rendering, and returns a Job, the handle of it:
 
+        from time import sleep
+
         with et.start("scenes/cornell.xml", "bdpt", time=60) as job:
             while not job.done and (job.progress.error or 1) > 0.05:
                 sleep(0.1)

@@ -6,6 +6,8 @@ from . import _etendue
 def limit_memory(size: int | str | None) -> None:
     """Limits the memory of this process, as `--memory` does that of the program.
 
+        et.limit_memory("4G")
+
     size: bytes, as a number or as a text such as "4G" or "1.5G" (units are powers of 1024); None ends the limit.
 
     The limit includes all that Python and other packages have, and 8 MiB for the stack of each thread. What does not fit is

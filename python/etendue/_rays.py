@@ -39,6 +39,10 @@ class RayHits:
     """Index of the triangle in its mesh, 0 on other shapes; -1 for rays that hit nothing."""
     slack: Floats
     """Distance from p, along the normal, within which rounding may find the surface again, in scene units."""
+    instance: NDArray[np.int32]
+    """Number of the instance that shows the shape; -1 for shapes of the scene itself, and for rays that hit nothing."""
+    parameters: Floats
+    """Parameters of the position within the primitive, shape (..., 2): with them, Scene.bsdf() finds it again."""
 
     @property
     def is_hit(self) -> NDArray[np.bool_]:
@@ -86,11 +90,11 @@ def _vectors(name: str, value: ArrayLike) -> Doubles:
     return array
 
 
-def _unit(value: ArrayLike) -> Doubles:
-    d = _vectors("directions", value)
+def _unit(value: ArrayLike, name: str = "directions") -> Doubles:
+    d = _vectors(name, value)
     largest = np.abs(d).max(axis=-1, keepdims=True)
     if not largest.all():
-        raise ValueError(f"directions{list(_first(largest[..., 0] == 0)) or ''} is zero")
+        raise ValueError(f"{name}{list(_first(largest[..., 0] == 0)) or ''} is zero")
     d = d / largest  # so that squares are no denormal numbers
     return np.asarray(d / np.linalg.norm(d, axis=-1, keepdims=True))
 
@@ -126,8 +130,8 @@ def intersect(scene: Scene, origins: ArrayLike, directions: ArrayLike, max_dista
         return np.full((n, *columns), np.nan, dtype=np.float32)
 
     t = np.full(n, np.inf, dtype=np.float32)
-    numbers = [np.full(n, -1, dtype=np.int32) for _ in range(2)]
-    hits = RayHits(t, nan(3), nan(3), nan(3), nan(2), *numbers, nan())
+    shape, primitive, instance = (np.full(n, -1, dtype=np.int32) for _ in range(3))
+    hits = RayHits(t, nan(3), nan(3), nan(3), nan(2), shape, primitive, nan(), instance, nan(2))
     _etendue.intersect_rays(scene, o, d, tmax, *(getattr(hits, field.name) for field in fields(hits)))
     return RayHits(*(a.reshape((*lead, *a.shape[1:])) for a in (getattr(hits, field.name) for field in fields(hits))))
 

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from . import _etendue
 from ._arguments import count, whole
 from ._denoiser_library import denoiser_library
-from ._etendue import Scene
+from ._etendue import Description, Scene
 from ._html import image_html, png_of
 from ._integrator import Integrator
 from ._method import Method
 from ._plots import axes_or_new
 from ._progress import harmless
-from ._scenes import SceneLike, built
+from ._scenes import SceneLike, built, described
 
 Image = NDArray[np.float32]
 
@@ -418,6 +418,48 @@ def render(
     return run(rendering, aovs, callback, progress, live)
 
 
+def render_sensors(
+    scene: SceneLike,
+    integrator: Method = "",
+    sensors: Iterable[int | str] | None = None,
+    *,
+    resolution: tuple[int, int] | None = None,
+    threads: int = 0,
+    **limits: Any,
+) -> list[Result]:
+    """Renders what several sensors of a scene see, one after the other. Geometry, hierarchy and images of the scene are made once.
+
+        left, right = et.render_sensors("scenes/stereo.xml", "bdpt", ["left", "right"], spp=64)
+        names = left.scene.sensors
+
+    scene: a Description, a dict as load_dict() takes it, or a file. A Scene has one sensor only (ValueError).
+    sensors: their numbers (from 0) or names, in the order of the results; None: all sensors of the scene.
+    resolution: (width, height) of all images in pixels, instead of those of the scene.
+    threads: number of threads; 0 for one per core.
+    limits: the other arguments of render(): spp, time and error are those of each image.
+
+    Ctrl-C ends the rendering of one sensor, whose result has stopped_by "interrupted" and is the last one. Raises SceneError
+    for a sensor that is not there, before anything is rendered, and else what render() raises.
+    """
+    if isinstance(scene, Scene):
+        raise ValueError("a Scene has one sensor only: give its Description, or the dict or file that it was made of")
+    description = described(scene)
+    chosen: list[int | str] = []
+    for sensor in range(len(_scene_of(description, resolution, threads, 0).sensors)) if sensors is None else sensors:
+        chosen.append(sensor if isinstance(sensor, str) else whole("sensors", sensor))
+    scenes = [_scene_of(description, resolution, threads, sensor) for sensor in chosen]
+    results: list[Result] = []
+    for each in scenes:
+        results.append(render(each, integrator, threads=threads, **limits))
+        if results[-1].stopped_by == "interrupted":
+            break
+    return results
+
+
+def _scene_of(description: Description, resolution: tuple[int, int] | None, threads: int, sensor: int | str) -> Scene:
+    return description.build(resolution=resolution, threads=threads, sensor=sensor)
+
+
 def new_rendering(
     scene: SceneLike,
     integrator: Method,
@@ -466,6 +508,9 @@ def resume(
 ) -> Result:
     """Goes on from a checkpoint (Result.save, Progress.save) with the same bits as if the rendering had not been interrupted.
 
+        et.render(scene, "bdpt", spp=64).save("night.etd")
+        result = et.resume("night.etd", scene, spp=256)
+
     file: an .etd file. It must be your own: what it has learned is used as it is.
     scene: the same scene, as for render(). If it has several sensors, a Scene with the same sensor.
     integrator: if it was one in Python, an object that is equal to what it was at the start.
@@ -488,6 +533,9 @@ def resume(
 
 def merge(parts: Iterable[str | PathLike[str] | bytes | Result]) -> Result:
     """Adds up renderings of one scene by one method: results, partial results (Result.partial), or .etd files.
+
+        parts = [et.render(scene, "bdpt", spp=16, seed=seed) for seed in range(4)]
+        result = et.merge(parts)
 
     They must have other seeds or other passes of the same seed; nothing depends on their order. Error, interval,
     statistics and technique images of the result are those of all passes. Renderings of other scenes or methods, and

@@ -49,7 +49,14 @@ def _status(progress: bool | None) -> tuple[Callable[[str], None] | None, Callab
 
 
 class CompareReport:
-    """Errors of methods on scenes, at equal time or equal samples."""
+    """Errors of methods on scenes, at equal time or equal samples.
+    compare() makes it, and notebooks show it as a table.
+
+        report = et.compare("scenes/cornell.xml", ["path", "bdpt"], spp=16)
+        rows = report.frame()
+        error = et.diff(report.image(method=1), report.reference())["rel_mse"]
+        report.save("out/report")
+    """
 
     def __init__(self, comparisons: Any, data: Mapping[str, Any]):
         self._comparisons = comparisons

@@ -22,6 +22,9 @@ def load(
     """Reads a scene file: .xml of Mitsuba 0.6 and 3, .pbrt of pbrt-v3 and v4, .gltf and .glb of glTF 2.0, or .usd, .usda, .usdc
     and .usdz of Universal Scene Description, for which the package usd-core must be installed.
 
+        description = et.load("scenes/cornell.xml")
+        scene = description.build(resolution=(64, 64))
+
     defines: values of the parameters of the scene ($name), like the option -D of the program.
     lenient: unknown elements are left out, with a warning in Description.warnings, instead of causing errors.
     usd: for files of USD, the other arguments of etendue.usd.load(): variants, time, camera, purposes, subdivision.
@@ -42,6 +45,8 @@ def load_string(
     xml: str, defines: Mapping[str, object] = {}, *, name: str = "scene.xml", lenient: bool = False
 ) -> Description:
     """Reads a scene from xml, the text of a Mitsuba scene file.
+
+        description = et.load_string('<scene version="3.0.0"><sensor type="perspective"/><emitter type="constant"/></scene>')
 
     defines, lenient: see load().
     name: file name for messages. Names of other files in the scene are relative to the folder of this file.
@@ -89,13 +94,18 @@ def built(scene: SceneLike, threads: int = 0, sensor: int | str | None = None) -
         if sensor is not None:
             raise ValueError("sensor is for files, dicts and Descriptions: a Scene has its sensor from Description.build(sensor=...)")
         return scene
+    return described(scene).build(threads=threads, sensor=sensor)
+
+
+def described(scene: SceneLike) -> Description:
+    """The description itself, or that of a dict or file."""
     if isinstance(scene, (str, PathLike)):
         scene = load(scene)
     if isinstance(scene, dict):
         scene = load_dict(scene)
     if not isinstance(scene, Description):
         raise TypeError(f"a scene is a Scene, a Description, a dict or the name of a file, but found {type(scene).__name__}")
-    return scene.build(threads=threads, sensor=sensor)
+    return scene
 
 
 def _matrix(rows: list[Any]) -> NDArray[np.float64]:
@@ -105,31 +115,46 @@ def _matrix(rows: list[Any]) -> NDArray[np.float64]:
 def look_at(origin: Vector, target: Vector, up: Vector = (0, 1, 0)) -> NDArray[np.float64]:
     """The to_world transform, a 4x4 matrix, of a sensor at origin that looks at target. Points are in scene units.
 
+        description["sensor.to_world"] = et.look_at((0, 1, 5), (0, 1, 0))
+
     Raises ValueError if origin and target are equal, or if up points along the viewing direction.
     """
     return _matrix(_etendue.look_at(origin, target, up))
 
 
 def translate(x: float = 0, y: float = 0, z: float = 0) -> NDArray[np.float64]:
-    """A translation in scene units, as a 4x4 matrix. Matrices are combined by @; the right one is applied first."""
+    """A translation in scene units, as a 4x4 matrix. Matrices are combined by @;
+    the right one is applied first.
+
+        to_world = et.translate(y=2) @ et.rotate((0, 1, 0), 30) @ et.scale(0.5)
+    """
     matrix = np.eye(4)
     matrix[:3, 3] = (x, y, z)
     return matrix
 
 
 def scale(x: float, y: float | None = None, z: float | None = None) -> NDArray[np.float64]:
-    """A scaling along the axes, as a 4x4 matrix. If only x is given, it applies to all axes. Dimensionless."""
+    """A scaling along the axes, as a 4x4 matrix.
+    If only x is given, it applies to all axes. Dimensionless.
+
+        flat = et.scale(1, 0.1, 1)
+    """
     return np.diag([x, x if y is None else y, x if z is None else z, 1.0])
 
 
 def rotate(axis: Vector, degrees: float) -> NDArray[np.float64]:
     """A right-handed rotation by an angle in degrees about an axis (any length except 0; otherwise ValueError), as a 4x4
-    matrix."""
+    matrix.
+
+        quarter = et.rotate((0, 0, 1), 90)
+    """
     return _matrix(_etendue.rotate(axis, degrees))
 
 
 def plugins(category: str = "", name: str = "") -> list[dict[str, Any]]:
     """All plug-ins with their parameters, types, defaults and descriptions, like `etendue list --json`.
+
+        names = [plugin["name"] for plugin in et.plugins("bsdf")]
 
     category, name: return only these plug-ins, such as plugins("bsdf", "diffuse"). The category "integrator" contains the
         integrators of render().

@@ -55,6 +55,9 @@ class _Png:
 def show(image: Any) -> Any:
     """Shows an image (radiance, linear RGB, shape (H, W, 3)) or a Result in a notebook, with controls for exposure in stops
     and tone mapping, and the radiance of the pixel under the pointer. Without anywidget, shows a tone-mapped PNG.
+
+        et.show(result)
+        et.show(et.read_image("a.exr"))
     """
     widget = _widget(image)
     return _Png(image) if widget is None else widget

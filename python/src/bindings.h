@@ -16,22 +16,31 @@
 #include "description/scene_description.h"
 #include "film/film.h"
 #include "integrator/integrator.h"
+#include "scene/builder.h"
 #include "scene/scene.h"
 
 namespace etendue::python {
 
 namespace nb = nanobind;
 
+/// What Python calls a Description, with the parts of the scene that was last built from it or from a copy.
+struct Description : SceneDescription {
+    Description() = default;
+    Description(SceneDescription d) : SceneDescription(std::move(d)) {}
+
+    std::shared_ptr<const BuiltParts> built;
+};
+
 /// A scene, and the description that it was built from.
 struct SceneHandle : std::enable_shared_from_this<SceneHandle> {
-    SceneHandle(SceneDescription d, Scene s);
+    SceneHandle(Description d, Scene s);
     SceneHandle(const SceneHandle&) = delete;
     SceneHandle& operator=(const SceneHandle&) = delete;
     ~SceneHandle();
     /// The handle of a scene, which keeps it alive.
     static std::shared_ptr<SceneHandle> of(const Scene& scene);
 
-    SceneDescription description;
+    Description description;
     Scene scene;
     uint64_t fingerprint;  ///< scene_fingerprint(); files may change after the scene was built.
     bool lenient = false, watertight = false;  ///< As it was built.
@@ -122,6 +131,7 @@ void bind_render(nb::module_& m);
 void bind_reports(nb::module_& m);
 void bind_images(nb::module_& m);
 void bind_rays(nb::module_& m);
+void bind_scattering(nb::module_& m);
 void bind_techniques(nb::module_& m);
 void bind_sub_paths(nb::module_& m);
 void bind_integrators(nb::module_& m);

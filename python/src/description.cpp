@@ -373,7 +373,7 @@ Place find(const SceneDescription& scene, const std::string& path) {
                                             hint(at.parameter, known)));
 }
 
-nb::object get(const SceneDescription& scene, const std::string& path) {
+nb::object get(const Description& scene, const std::string& path) {
     const Place at = find(scene, path);
     if (at.parameter.empty())
         return at.object < 0 ? DictWriter(scene).scene()
@@ -390,7 +390,7 @@ nb::object get(const SceneDescription& scene, const std::string& path) {
     fail_unknown(scene, path, at);
 }
 
-bool contains(const SceneDescription& scene, const std::string& path) {
+bool contains(const Description& scene, const std::string& path) {
     const Place at = find(scene, path);
     if (at.object < 0) return false;
     const SceneObject& o = scene.objects[size_t(at.object)];
@@ -398,7 +398,7 @@ bool contains(const SceneDescription& scene, const std::string& path) {
            !embedded_part(scene, o, at.parameter).is_none();
 }
 
-void erase(SceneDescription& scene, const std::string& path) {
+void erase(Description& scene, const std::string& path) {
     const Place at = find(scene, path);
     if (at.parameter.empty() && at.object >= 0) {
         if (at.parent < 0)
@@ -491,8 +491,8 @@ void set_in(SceneDescription& scene, const std::string& path, nb::handle value) 
 
 /// All or nothing: a value that is refused leaves the description as it was. Copies of descriptions share their meshes and
 /// images.
-void set(SceneDescription& scene, const std::string& path, nb::handle value) {
-    SceneDescription changed = scene;
+void set(Description& scene, const std::string& path, nb::handle value) {
+    Description changed = scene;
     set_in(changed, path, value);
     if (const Place at = find(changed, path); at.object >= 0 && !at.parameter.empty()) {
         // The type is that of the table.
@@ -506,7 +506,7 @@ void set(SceneDescription& scene, const std::string& path, nb::handle value) {
     scene = std::move(changed);
 }
 
-std::vector<std::string> paths(const SceneDescription& scene) {
+std::vector<std::string> paths(const Description& scene) {
     // Groups of shapes within others multiply the paths that lead to what they contain.
     constexpr size_t kMostPaths = 1'000'000;
     std::vector<std::string> all;
@@ -535,8 +535,8 @@ struct SensorText {
     }
 };
 
-/// `description` is a copy: other threads may edit the original while the scene is built.
-ScenePtr build(SceneDescription description, const std::optional<std::pair<int, int>>& resolution,
+/// Builds a copy, since other threads may edit the description in the meantime.
+ScenePtr build(Description& edited, const std::optional<std::pair<int, int>>& resolution,
                const std::optional<std::array<int, 4>>& crop, bool lenient, bool watertight,
                int threads, const std::optional<std::variant<int, std::string>>& sensor) {
     BuildOptions options;
@@ -552,11 +552,18 @@ ScenePtr build(SceneDescription description, const std::optional<std::pair<int, 
     }
     options.crop = crop;
     use_threads();
-    nb::gil_scoped_release no_gil;
-    Scene scene = build_scene(description, options);
-    auto handle = std::make_shared<SceneHandle>(std::move(description), std::move(scene));
+    Description description = edited;
+    options.earlier = edited.built;
+    ScenePtr handle;
+    {
+        const nb::gil_scoped_release no_gil;
+        BuiltScene built = build_scene_again(description, options);
+        description.built = std::move(built.parts);
+        handle = std::make_shared<SceneHandle>(std::move(description), std::move(built.scene));
+    }
     handle->lenient = lenient;
     handle->watertight = watertight;
+    edited.built = handle->description.built;
     return handle;
 }
 
@@ -622,6 +629,10 @@ nb::str html(const char* function, nb::handle of) {
     return nb::cast<nb::str>(nb::module_::import_("etendue._html").attr(function)(of));
 }
 
+nb::object scattering(const char* query, nb::handle scene, nb::handle at, nb::handle more) {
+    return nb::module_::import_("etendue._scattering").attr(query)(scene, at, more);
+}
+
 nb::object rays(const char* query, nb::handle scene, nb::handle origins, nb::handle directions,
                 nb::handle max_distance) {
     return nb::module_::import_("etendue._rays")
@@ -635,14 +646,22 @@ void bind_description(nb::module_& m) {
     nb::exception<SceneError>(m, "SceneError", PyExc_ValueError).attr("__doc__") =
         "An invalid scene: the message says where, what was expected, and what is near.";
 
-    nb::class_<SceneDescription>(
+    nb::class_<Description>(
         m, "Description",
         "The contents of a scene as plain data: objects with named parameters. Edit it by path, "
         "and "
         "build() scenes from it.\n\n"
         "A path joins keys by dots: \"ball.bsdf.reflectance\". The key of an object is its id or "
         "its "
-        "parameter name; without either its category (\"sensor\", \"shape\", \"shape_2\").")
+        "parameter name; without either its category (\"sensor\", \"shape\", \"shape_2\").\n\n"
+        "    description = et.load(\"scenes/cornell.xml\")\n"
+        "    description[\"white.bsdf.reflectance\"] = (0.9, 0.8, 0.7)\n"
+        "    description[\"lens\"] = {\"type\": \"sphere\", \"radius\": 0.2, \"center\": (0, 0.5, "
+        "0)}\n"
+        "    matching = [path for path in description if path.endswith(\"reflectance\")]\n"
+        "    del description[\"lens\"]\n\n"
+        "It keeps what its last build() made, so that the next one makes only what an edit has "
+        "changed.")
         .def("__getitem__", &get, "path"_a,
              "The parameter or object that a path names: a number, a text, a list of 3 numbers, a "
              "colour as {\"type\": \"rgb\"}, a 4x4 list, or a dict.")
@@ -652,11 +671,11 @@ void bind_description(nb::module_& m) {
              "an unknown name or a value of the wrong type, and changes nothing then.")
         .def("__delitem__", &erase, "path"_a, "Removes a parameter or an object.")
         .def(
-            "__iter__", [](const SceneDescription& d) { return nb::iter(nb::cast(paths(d))); },
+            "__iter__", [](const Description& d) { return nb::iter(nb::cast(paths(d))); },
             nb::sig("def __iter__(self) -> collections.abc.Iterator[str]"),
             "Iterates over paths().")
         .def(
-            "__len__", [](const SceneDescription& d) { return paths(d).size(); },
+            "__len__", [](const Description& d) { return paths(d).size(); },
             "The number of paths().")
         .def(
             "keys", [](nb::handle self) { return view("KeysView", self); },
@@ -673,29 +692,29 @@ void bind_description(nb::module_& m) {
         .def("_ipython_key_completions_", &paths)
         .def("_repr_html_", [](nb::handle self) { return html("description_html", self); })
         .def("__repr__",
-             [](const SceneDescription& d) {
+             [](const Description& d) {
                  return fmt::format("<Description {}, {} objects>", d.file, d.objects.size());
              })
         .def("__contains__", &contains, "path"_a,
              "Whether the description has a parameter or object of this path.")
         .def(
-            "copy", [](const SceneDescription& d) { return d; },
+            "copy", [](const Description& d) { return d; },
             "A copy, a description to be edited on its own.")
-        .def("__copy__", [](const SceneDescription& d) { return d; })
+        .def("__copy__", [](const Description& d) { return d; })
         .def(
-            "__deepcopy__", [](const SceneDescription& d, nb::handle) { return d; }, "memo"_a)
+            "__deepcopy__", [](const Description& d, nb::handle) { return d; }, "memo"_a)
         .def("paths", &paths, "The paths of all objects and parameters, in order.")
         .def(
-            "to_dict", [](const SceneDescription& d) { return DictWriter(d).scene(); },
+            "to_dict", [](const Description& d) { return DictWriter(d).scene(); },
             "The description as nested dicts, which load_dict() takes.")
         .def(
-            "dump", [](const SceneDescription& d) { return dump(d); },
+            "dump", [](const Description& d) { return dump(d); },
             "Canonical text: one line for each object and parameter. Equal for equal scenes, "
             "whatever "
             "they were read from.")
         .def(
             "save",
-            [](const SceneDescription& d, nb::handle file, bool mitsuba) {
+            [](const Description& d, nb::handle file, bool mitsuba) {
                 const auto name =
                     nb::cast<std::string>(nb::module_::import_("os").attr("fspath")(file));
                 for (const std::string& note : save(d, name, mitsuba))
@@ -711,10 +730,10 @@ void bind_description(nb::module_& m) {
             "Raises ValueError for another extension, and RuntimeError if a file cannot be "
             "written.")
         .def_prop_ro(
-            "file", [](const SceneDescription& d) { return d.file; },
+            "file", [](const Description& d) { return d.file; },
             "The file that it was read from; \"dict\" for dicts without one.")
         .def_prop_ro(
-            "warnings", [](const SceneDescription& d) { return d.warnings; },
+            "warnings", [](const Description& d) { return d.warnings; },
             "What was left out or replaced by the reader, one sentence each.")
         .def(
             "build", &build, "resolution"_a.none() = nb::none(), "crop"_a.none() = nb::none(),
@@ -728,7 +747,12 @@ void bind_description(nb::module_& m) {
             "watertight: lets no ray pass between adjacent triangles; slower.\n"
             "threads: number of threads; 0 for one per core.\n"
             "sensor: number (from 0) or name of the sensor; None: the first. See Scene.sensors.\n\n"
-            "    scene = description.build(resolution=(320, 240), sensor=1)");
+            "    scene = description.build(resolution=(320, 240), sensor=0)\n\n"
+            "After an edit, meshes, images, and the hierarchy of rays that did not change are "
+            "shared with the scene that this description, or the one that it is a copy of, built "
+            "last. If a shape of the scene itself moves, the hierarchy is built again; if an "
+            "instance moves, only the part above the groups. Files that have changed are read "
+            "again. The scene is the same as if it were built from nothing.");
 
     nb::class_<SceneHandle>(
         m, "Scene",
@@ -809,6 +833,48 @@ void bind_description(nb::module_& m) {
             "Whether rays hit anything within max_distance, shape (...). The arguments are those "
             "of "
             "ray_intersect().")
+        .def_prop_ro(
+            "crop_offset",
+            [](const SceneHandle& s) {
+                return std::pair(s.scene.film().crop_x, s.scene.film().crop_y);
+            },
+            "Position (x, y) of the rendered part in the whole image, in pixels.")
+        .def(
+            "bsdf",
+            [](nb::handle self, nb::handle at, nb::handle uv) {
+                return scattering("bsdf", self, at, uv);
+            },
+            "at"_a, "uv"_a = nb::make_tuple(0.5, 0.5),
+            nb::sig("def bsdf(self, at: etendue._rays.RayHits | int | str, uv: "
+                    "numpy.typing.ArrayLike = (0.5, 0.5)) -> etendue._scattering.Bsdfs"),
+            "The materials at points of surfaces, as Bsdfs with eval(), pdf() and sample().\n\n"
+            "    f = scene.bsdf(0).eval((0, 0, 1), directions)    # directions: shape (N, 3)\n\n"
+            "at: hits of ray_intersect(), where directions are those of the scene; or the number "
+            "or "
+            "name of a shape, whose material is then seen in a frame of its own: z is the normal, "
+            "x "
+            "and y are the tangents along u and v.\n"
+            "uv: texture coordinates in that frame, shape (..., 2).\n\n"
+            "Raises ValueError for rays that hit nothing, and for shapes that are not there.")
+        .def(
+            "sensor_rays",
+            [](nb::handle self, nb::handle film, nb::handle lens) {
+                return scattering("sensor_rays", self, film, lens);
+            },
+            "film"_a.none() = nb::none(), "lens"_a = nb::make_tuple(0.5, 0.5),
+            nb::sig("def sensor_rays(self, film: numpy.typing.ArrayLike | None = None, lens: "
+                    "numpy.typing.ArrayLike = (0.5, 0.5)) -> etendue._scattering.SensorRays"),
+            "Rays of the sensor through points of the film, as SensorRays.\n\n"
+            "    rays = scene.sensor_rays()                       # through the centres of all "
+            "pixels\n"
+            "    hits = scene.ray_intersect(rays.origins, rays.directions)\n\n"
+            "film: in pixels from the upper left corner of the whole image, shape (..., 2); the "
+            "centre of the first pixel is (0.5, 0.5). None: the centres of the pixels of the "
+            "rendered part, shape (H, W).\n"
+            "lens: numbers in [0, 1) that choose the point of a finite lens, shape (..., 2).\n\n"
+            "With these rays, the radiance that arrives along them is the value of the pixel. "
+            "Raises "
+            "ValueError for other shapes and for numbers that are not finite.")
         .def("_repr_html_", [](nb::handle self) { return html("scene_html", self); })
         .def("__repr__", [](const SceneHandle& s) {
             const FilmGeometry& film = s.scene.film();
@@ -823,7 +889,7 @@ void bind_description(nb::module_& m) {
            bool lenient) {
             const ReadOptions options = read_options(defines, lenient);
             nb::gil_scoped_release no_gil;
-            return read_scene_file(file, options);
+            return Description(read_scene_file(file, options));
         },
         "file"_a, "defines"_a, "lenient"_a);
     m.def(
@@ -832,14 +898,14 @@ void bind_description(nb::module_& m) {
            const std::string& name, bool lenient) {
             const ReadOptions options = read_options(defines, lenient);
             const nb::gil_scoped_release no_gil;
-            return parse_mitsuba_xml(xml, name, options);
+            return Description(parse_mitsuba_xml(xml, name, options));
         },
         "xml"_a, "defines"_a, "name"_a, "lenient"_a);
     m.def(
         "load_dict",
         [](nb::dict d, const std::string& folder, const std::string& file,
            std::vector<std::string> warnings) {
-            SceneDescription scene;
+            Description scene;
             scene.file = file;
             scene.search_paths = {folder};
             scene.warnings = std::move(warnings);

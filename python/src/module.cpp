@@ -9,6 +9,7 @@ NB_MODULE(_etendue, m) {
     bind_description(m);
     bind_images(m);
     bind_rays(m);
+    bind_scattering(m);
     bind_techniques(m);
     bind_sub_paths(m);
     bind_integrators(m);

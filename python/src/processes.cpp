@@ -22,7 +22,7 @@ std::atomic<bool> has_used_threads{false}, has_lost_threads{false};
 
 }  // namespace
 
-SceneHandle::SceneHandle(SceneDescription d, Scene s)
+SceneHandle::SceneHandle(Description d, Scene s)
     : description(std::move(d)), scene(std::move(s)), fingerprint(scene_fingerprint(description)) {
     const std::scoped_lock lock(scenes_mutex);
     scenes.emplace(&scene, this);

@@ -1,44 +1,10 @@
 // Rays by the array: their first hits, and whether they hit anything.
 
-#include <algorithm>
-
+#include "arrays.h"
 #include "bindings.h"
-#include "film/parallel_for.h"
-#include "film/thread_arena.h"
 
 namespace etendue::python {
 namespace {
-
-template <class T, class... Shape>
-using Array = nb::ndarray<T, Shape..., nb::c_contig, nb::device::cpu>;
-template <class T>
-using Column = Array<T, nb::ndim<1>>;
-template <class T, int kColumns>
-using Rows = Array<T, nb::shape<-1, kColumns>>;
-
-Vec3 row(const Rows<const float, 3>& rows, size_t i) {
-    const float* v = rows.data() + 3 * i;
-    return {v[0], v[1], v[2]};
-}
-void set_row(const Rows<float, 3>& rows, size_t i, Vec3 v) {
-    float* const to = rows.data() + 3 * i;
-    to[0] = v.x, to[1] = v.y, to[2] = v.z;
-}
-
-/// Calls body(i) for each of n rays, by several threads and without the GIL.
-template <class Body>
-void for_each_ray(size_t n, const Body& body) {
-    use_threads();
-    const nb::gil_scoped_release no_gil;
-    constexpr size_t kGrain = 1024;
-    ThreadArena arena(0);
-    arena.execute([&] {
-        parallel_for((n + kGrain - 1) / kGrain, [&](size_t grain) {
-            const size_t end = std::min(n, (grain + 1) * kGrain);
-            for (size_t i = grain * kGrain; i < end; ++i) body(i);
-        });
-    });
-}
 
 bool intersect(const Scene& scene, const Ray& ray, SurfaceHit& hit) {
     // Masked surfaces let the ray pass as long as more than half of it is left.
@@ -51,9 +17,10 @@ void intersect_rays(const ScenePtr& handle, const Rows<const float, 3>& o,
                     const Column<float>& t, const Rows<float, 3>& p, const Rows<float, 3>& ng,
                     const Rows<float, 3>& ns, const Rows<float, 2>& uv,
                     const Column<int32_t>& shape, const Column<int32_t>& primitive,
-                    const Column<float>& slack) {
+                    const Column<float>& slack, const Column<int32_t>& instance,
+                    const Rows<float, 2>& parameters) {
     const Scene& scene = handle->scene;
-    for_each_ray(t.size(), [&](size_t i) {
+    for_each_row(t.size(), [&](size_t i) {
         SurfaceHit hit;
         if (!intersect(scene, {row(o, i), row(d, i), tmax.data()[i]}, hit)) return;
         t.data()[i] = hit.t;
@@ -65,6 +32,9 @@ void intersect_rays(const ScenePtr& handle, const Rows<const float, 3>& o,
         shape.data()[i] = int32_t(hit.location.shape);
         primitive.data()[i] = int32_t(hit.location.prim);
         slack.data()[i] = hit.geometry.slack;
+        instance.data()[i] = int32_t(hit.location.instance);
+        parameters.data()[2 * i] = hit.location.u;
+        parameters.data()[2 * i + 1] = hit.location.v;
     });
 }
 
@@ -72,7 +42,7 @@ void occluded_rays(const ScenePtr& handle, const Rows<const float, 3>& o,
                    const Rows<const float, 3>& d, const Column<const float>& tmax,
                    const Column<bool>& occluded) {
     const Scene& scene = handle->scene;
-    for_each_ray(occluded.size(), [&](size_t i) {
+    for_each_row(occluded.size(), [&](size_t i) {
         const Ray ray{row(o, i), row(d, i), tmax.data()[i]};
         SurfaceHit hit;
         occluded.data()[i] =
@@ -92,7 +62,8 @@ void offset_origins(const Rows<const float, 3>& p, const Rows<const float, 3>& n
 void bind_rays(nb::module_& m) {
     using namespace nb::literals;
     m.def("intersect_rays", &intersect_rays, "scene"_a, "o"_a, "d"_a, "tmax"_a, "t"_a, "p"_a,
-          "ng"_a, "ns"_a, "uv"_a, "shape"_a, "primitive"_a, "slack"_a);
+          "ng"_a, "ns"_a, "uv"_a, "shape"_a, "primitive"_a, "slack"_a, "instance"_a,
+          "parameters"_a);
     m.def("occluded_rays", &occluded_rays, "scene"_a, "o"_a, "d"_a, "tmax"_a, "occluded"_a);
     m.def("offset_origins", &offset_origins, "p"_a, "ng"_a, "slack"_a, "d"_a, "origins"_a);
 }

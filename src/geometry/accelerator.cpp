@@ -91,7 +91,7 @@ float error_of_inverse(const Transform& to_world) {
 /// What Embree allocates, and how much it may.
 struct MemoryBudget {
     std::atomic<int64_t> bytes{0};
-    int64_t most = 0;
+    std::atomic<int64_t> most{0};
 };
 
 /// False refuses an allocation.
@@ -131,30 +131,70 @@ size_t memory_of_machine() {
     return size_t(available_memory().value_or(UINT64_MAX));
 }
 
-struct Accelerator::Impl {
-    AcceleratorOptions options;
+namespace {
+
+/// What hierarchies that share parts have in common.
+struct Device {
     MemoryBudget memory;
     RTCDevice device = nullptr;
+
+    Device() {
+        device = rtcNewDevice(kDevice);
+        if (!device) throw std::runtime_error("Embree cannot start, perhaps for want of memory");
+        rtcSetDeviceMemoryMonitorFunction(device, memory_callback, &memory);
+    }
+    ~Device() { rtcReleaseDevice(device); }
+    Device(const Device&) = delete;
+    Device& operator=(const Device&) = delete;
+
+    /// Allows that many bytes beside what is allocated.
+    void allow(size_t most_bytes) {
+        const int64_t used = std::max<int64_t>(0, memory.bytes);
+        memory.most = int64_t(std::min(most_bytes, size_t(INT64_MAX - used))) + used;
+    }
+};
+
+/// A part of the hierarchy, and its memory.
+struct Part {
+    std::shared_ptr<Device> device;
+    RTCScene scene = nullptr;
+    std::vector<const Shape*> shapes;  ///< Of a group.
+    int64_t bytes = 0;
+
+    Part(std::shared_ptr<Device> on, bool is_watertight) : device(std::move(on)) {
+        scene = rtcNewScene(device->device);
+        rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
+        if (is_watertight) rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+    }
+    ~Part() { rtcReleaseScene(scene); }
+    Part(const Part&) = delete;
+    Part& operator=(const Part&) = delete;
+};
+
+}  // namespace
+
+struct Accelerator::Impl {
+    AcceleratorOptions options;
+    std::shared_ptr<Device> shared;
+    RTCDevice device = nullptr;
+    std::shared_ptr<Part> part;  ///< With the shapes and instances of the scene itself.
     RTCScene top = nullptr;
-    std::vector<RTCScene> groups;
+    std::vector<std::shared_ptr<const Part>> groups, earlier_groups;
     std::vector<std::pair<uint32_t, uint32_t>> group_shapes;  ///< Indices [first, second).
     /// By geometry id of the top-level scene: index of the shape, or of the instance.
     std::vector<uint32_t> shape_of_geom;
     std::vector<Instance> instances;
     uint32_t shape_count = 0;
     std::vector<const AnalyticShape*> analytic;  ///< By shape; nullptr for meshes.
+    int64_t bytes_before = 0;                    ///< Of the device, without the top and new groups.
+    int64_t group_bytes = 0;                     ///< Of new groups.
 
-    explicit Impl(const AcceleratorOptions& o) : options(o) {
-        memory.most = int64_t(std::min(options.most_bytes, size_t(INT64_MAX)));
-        device = rtcNewDevice(kDevice);
-        if (!device) throw std::runtime_error("Embree cannot start, perhaps for want of memory");
-        rtcSetDeviceMemoryMonitorFunction(device, memory_callback, &memory);
-        top = new_scene();
-    }
-    ~Impl() {
-        if (top) rtcReleaseScene(top);
-        for (RTCScene g : groups) rtcReleaseScene(g);
-        if (device) rtcReleaseDevice(device);
+    Impl(const AcceleratorOptions& o, std::shared_ptr<Device> on)
+        : options(o), shared(std::move(on)), device(shared->device) {
+        shared->allow(options.most_bytes);
+        part = std::make_shared<Part>(shared, options.is_watertight);
+        top = part->scene;
+        bytes_before = shared->memory.bytes;
     }
 
     void check() const {
@@ -163,16 +203,9 @@ struct Accelerator::Impl {
         throw std::runtime_error(
             error == RTC_ERROR_OUT_OF_MEMORY
                 ? "the ray-tracing hierarchy needs more than " +
-                      format_bytes(uint64_t(memory.most)) +
+                      format_bytes(uint64_t(options.most_bytes)) +
                       " of memory, which is all that is free; use instances or coarser meshes"
                 : "Embree: error " + std::to_string(int(error)));
-    }
-
-    RTCScene new_scene() const {
-        RTCScene scene = rtcNewScene(device);
-        rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
-        if (options.is_watertight) rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
-        return scene;
     }
 
     uint32_t attach(RTCScene scene, const Shape& shape) const {
@@ -207,10 +240,13 @@ struct Accelerator::Impl {
 };
 
 Accelerator::Accelerator(const AcceleratorOptions& options)
-    : impl_(std::make_unique<Impl>(options)) {}
-Accelerator::~Accelerator() = default;
-Accelerator::Accelerator(Accelerator&&) noexcept = default;
-Accelerator& Accelerator::operator=(Accelerator&&) noexcept = default;
+    : impl_(std::make_shared<Impl>(options, std::make_shared<Device>())) {}
+
+Accelerator::Accelerator(const AcceleratorOptions& options, const Accelerator& earlier)
+    : impl_(std::make_shared<Impl>(options, earlier.impl_->shared)) {
+    if (options.is_watertight == earlier.impl_->options.is_watertight)
+        impl_->earlier_groups = earlier.impl_->groups;
+}
 
 uint32_t Accelerator::add_shape(const Shape& shape) {
     const uint32_t id = impl_->attach(impl_->top, shape);
@@ -220,23 +256,31 @@ uint32_t Accelerator::add_shape(const Shape& shape) {
 }
 
 uint32_t Accelerator::add_group(const std::vector<const Shape*>& shapes) {
-    RTCScene scene = impl_->new_scene();
-    impl_->groups.push_back(scene);
-    for (const Shape* s : shapes) {
-        impl_->attach(scene, *s);  // geometry ids count from 0
-        impl_->analytic.push_back(dynamic_cast<const AnalyticShape*>(s));
-    }
+    for (const Shape* s : shapes) impl_->analytic.push_back(dynamic_cast<const AnalyticShape*>(s));
     const uint32_t first = impl_->shape_count;
     impl_->shape_count += uint32_t(shapes.size());
     impl_->group_shapes.emplace_back(first, impl_->shape_count);
-    rtcCommitScene(scene);
-    impl_->check();
+    const auto known = std::find_if(impl_->earlier_groups.begin(), impl_->earlier_groups.end(),
+                                    [&](const auto& group) { return group->shapes == shapes; });
+    if (known != impl_->earlier_groups.end()) {
+        impl_->groups.push_back(*known);
+    } else {
+        const int64_t before = impl_->shared->memory.bytes;
+        auto group = std::make_shared<Part>(impl_->shared, impl_->options.is_watertight);
+        group->shapes = shapes;
+        for (const Shape* s : shapes) impl_->attach(group->scene, *s);  // ids count from 0
+        rtcCommitScene(group->scene);
+        impl_->check();
+        group->bytes = impl_->shared->memory.bytes - before;
+        impl_->group_bytes += group->bytes;
+        impl_->groups.push_back(std::move(group));
+    }
     return uint32_t(impl_->groups.size() - 1);
 }
 
 uint32_t Accelerator::add_instance(uint32_t group, const Transform& to_world) {
     RTCGeometry geometry = rtcNewGeometry(impl_->device, RTC_GEOMETRY_TYPE_INSTANCE);
-    rtcSetGeometryInstancedScene(geometry, impl_->groups[group]);
+    rtcSetGeometryInstancedScene(geometry, impl_->groups[group]->scene);
     float m[12];
     for (int row = 0; row < 3; ++row)
         for (int col = 0; col < 4; ++col) m[row * 4 + col] = float(to_world.matrix()[row][col]);
@@ -256,6 +300,8 @@ uint32_t Accelerator::add_instance(uint32_t group, const Transform& to_world) {
 void Accelerator::commit() {
     rtcCommitScene(impl_->top);
     impl_->check();
+    impl_->part->bytes = impl_->shared->memory.bytes - impl_->bytes_before - impl_->group_bytes;
+    impl_->earlier_groups.clear();
 }
 
 bool Accelerator::intersect(const Ray& ray, RayHit& out) const {
@@ -311,7 +357,9 @@ const Accelerator::Instance& Accelerator::instance(uint32_t index) const {
 }
 
 size_t Accelerator::memory_bytes() const {
-    return size_t(std::max<int64_t>(0, impl_->memory.bytes.load()));
+    int64_t bytes = impl_->part->bytes;
+    for (const auto& group : impl_->groups) bytes += group->bytes;
+    return size_t(std::max<int64_t>(0, bytes));
 }
 
 }  // namespace etendue

@@ -36,7 +36,7 @@ struct AcceleratorOptions {
     size_t most_bytes = memory_of_machine();
 };
 
-/// Shapes are added, then committed once; queries are thread-safe after that.
+/// Shapes are added, then committed once; queries are thread-safe after that. Copies share the hierarchy.
 class Accelerator {
 public:
     /// A group at its place.
@@ -50,9 +50,8 @@ public:
     };
 
     explicit Accelerator(const AcceleratorOptions& options = {});
-    ~Accelerator();
-    Accelerator(Accelerator&&) noexcept;
-    Accelerator& operator=(Accelerator&&) noexcept;
+    /// One that takes the hierarchies of groups of the same shapes from an earlier one with the same options.
+    Accelerator(const AcceleratorOptions& options, const Accelerator& earlier);
 
     /// The shape must outlive the accelerator. Returns its index.
     uint32_t add_shape(const Shape& shape);
@@ -74,7 +73,7 @@ public:
 
 private:
     struct Impl;
-    std::unique_ptr<Impl> impl_;
+    std::shared_ptr<Impl> impl_;
 };
 
 }  // namespace etendue

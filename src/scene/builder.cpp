@@ -10,6 +10,7 @@
 #include "description/resolve_file.h"
 #include "film/filter.h"
 #include "film/thread_arena.h"
+#include "scene/built_parts.h"
 #include "scene/model_builder.h"
 #include "scene/plugin_lookup.h"
 #include "scene/preload.h"
@@ -23,7 +24,8 @@ class SceneBuilder {
 public:
     SceneBuilder(const SceneDescription& description, const BuildOptions& options)
         : description_(description), options_(options), plugins_(description, options.lenient),
-          models_(plugins_), preload_(description, models_.images()) {}
+          earlier_(options_.earlier), models_(plugins_),
+          preload_(description, models_.images(), earlier_.get()) {}
 
     Scene build() {
         scene_.file_ = description_.file;
@@ -43,6 +45,17 @@ public:
         finish_emitters();
         count();
         return std::move(scene_);
+    }
+
+    /// What the scene that was built shares with the next one.
+    std::shared_ptr<const BuiltParts> parts(const Scene& scene) {
+        auto parts = std::make_shared<BuiltParts>();
+        parts->description = description_;
+        parts->shapes = preload_.take_all();
+        parts->images = scene.owned_->images->images();
+        parts->layout = std::move(layout_);
+        parts->accelerator = accelerator_;
+        return parts;
     }
 
 private:
@@ -311,8 +324,15 @@ private:
 
     void finish_geometry() {
         scene_.shapes_ = top_;
-        Accelerator& a = scene_.owned_->accelerator;
-        a = Accelerator(options_.accelerator);
+        for (const SceneShape& s : top_) layout_.top.push_back(s.shape);
+        for (const auto& group : groups_) {
+            std::vector<const Shape*>& shapes = layout_.groups.emplace_back();
+            for (const SceneShape& s : group) shapes.push_back(s.shape);
+            scene_.shapes_.insert(scene_.shapes_.end(), group.begin(), group.end());
+        }
+        for (const auto& [group, to_world] : instances_)
+            layout_.instances.emplace_back(group, to_world);
+        layout_.is_watertight = options_.accelerator.is_watertight;
         const auto add_bounds = [&](const SceneShape& s, const Bounds3& bounds, uint32_t instance) {
             scene_.bounds_.extend(bounds);
             if (!may_be_in_chain(s) || s.shape->primitive_count() == 0) return;
@@ -321,19 +341,9 @@ private:
                 scene_.clear_shapes_.push_back(
                     {s.shape, instance, bounds.center(), bounds.radius()});
         };
-        for (const SceneShape& s : top_) {
-            a.add_shape(*s.shape);
-            add_bounds(s, s.shape->bounds(), kNoInstance);
-        }
-        std::vector<uint32_t> ids;
-        for (const auto& group : groups_) {
-            std::vector<const Shape*> shapes;
-            for (const SceneShape& s : group) shapes.push_back(s.shape);
-            ids.push_back(a.add_group(shapes));
-            scene_.shapes_.insert(scene_.shapes_.end(), group.begin(), group.end());
-        }
+        for (const SceneShape& s : top_) add_bounds(s, s.shape->bounds(), kNoInstance);
+        uint32_t instance = 0;
         for (const auto& [group, to_world] : instances_) {
-            const uint32_t instance = a.add_instance(ids[group], to_world);
             for (const SceneShape& s : groups_[group]) {
                 const Bounds3 b = s.shape->bounds();
                 Bounds3 world;
@@ -343,9 +353,25 @@ private:
                                         corner & 4 ? b.hi.z : b.lo.z}));
                 add_bounds(s, world, instance);
             }
+            ++instance;
         }
         if (!scene_.bounds_.is_empty()) check_extent(scene_.bounds_, {description_.file, 0});
-        plugins_.guarded(0, [&] { a.commit(); });
+        plugins_.guarded(0, [&] { accelerator_ = make_accelerator(); });
+        scene_.owned_->accelerator = *accelerator_;
+    }
+
+    /// The earlier one, if it has the same shapes in the same places.
+    Accelerator make_accelerator() const {
+        if (earlier_ && earlier_->layout == layout_) return *earlier_->accelerator;
+        Accelerator a = earlier_ ? Accelerator(options_.accelerator, *earlier_->accelerator)
+                                 : Accelerator(options_.accelerator);
+        for (const Shape* s : layout_.top) a.add_shape(*s);
+        std::vector<uint32_t> ids;
+        for (const auto& shapes : layout_.groups) ids.push_back(a.add_group(shapes));
+        for (const auto& [group, to_world] : layout_.instances)
+            a.add_instance(ids[group], to_world);
+        a.commit();
+        return a;
     }
 
     void finish_emitters() {
@@ -557,6 +583,7 @@ private:
     const SceneDescription& description_;
     BuildOptions options_;
     PluginLookup plugins_;
+    std::shared_ptr<const BuiltParts> earlier_;
     ModelBuilder models_;
     Preload preload_;
     Scene scene_;
@@ -570,12 +597,24 @@ private:
     std::vector<SceneShape> top_;
     std::vector<std::vector<SceneShape>> groups_;
     std::vector<Instance> instances_;
+    AcceleratorLayout layout_;
+    std::optional<Accelerator> accelerator_;
 };
 
 Scene build_scene(const SceneDescription& description, const BuildOptions& options) {
     // Embree, too, uses the threads of the arena that calls it.
     ThreadArena arena(options.threads);
     return arena.execute([&] { return SceneBuilder(description, options).build(); });
+}
+
+BuiltScene build_scene_again(const SceneDescription& description, const BuildOptions& options) {
+    ThreadArena arena(options.threads);
+    return arena.execute([&] {
+        SceneBuilder builder(description, options);
+        Scene scene = builder.build();
+        auto parts = builder.parts(scene);
+        return BuiltScene{std::move(scene), std::move(parts)};
+    });
 }
 
 std::vector<PluginInfo> scene_plugins() {

@@ -212,7 +212,7 @@ private:
     friend class SceneBuilder;
     /// What scenes that differ in their films share.
     struct Owned {
-        std::vector<std::unique_ptr<Shape>> shapes;
+        std::vector<std::shared_ptr<const Shape>> shapes;
         std::unique_ptr<TextureCache> images;
         std::vector<std::unique_ptr<Texture>> textures;
         std::vector<std::unique_ptr<Material>> materials;

@@ -44,7 +44,13 @@ const PixelBuffer& TextureCache::find_or_read(const Key& key, const std::string&
                                               const Read& read) {
     {
         const std::lock_guard lock(mutex_);
-        if (const auto it = images_.find(key); it != images_.end()) return *it->second;
+        if (const auto it = images_.find(key); it != images_.end()) return *it->second.image;
+    }
+    const bool is_file = !std::get<const EncodedImage*>(key);
+    const FileState file = is_file ? file_state(name) : FileState{};
+    if (const Entry* known = find_earlier(key, file)) {
+        const std::lock_guard lock(mutex_);
+        return *images_.try_emplace(key, *known).first->second.image;
     }
     PixelBuffer image = read();
     const bool raw = std::get<bool>(key);
@@ -53,7 +59,16 @@ const PixelBuffer& TextureCache::find_or_read(const Key& key, const std::string&
         throw std::runtime_error("image \"" + name + "\" has " + std::to_string(bad) +
                                  " values that are infinite or NaN");
     const std::lock_guard lock(mutex_);
-    return *images_.try_emplace(key, std::make_unique<PixelBuffer>(std::move(image))).first->second;
+    auto shared = std::make_shared<const PixelBuffer>(std::move(image));
+    return *images_.try_emplace(key, Entry{std::move(shared), file}).first->second.image;
+}
+
+const TextureCache::Entry* TextureCache::find_earlier(const Key& key, const FileState& file) const {
+    if (!earlier_) return nullptr;
+    const auto it = earlier_->find(key);
+    if (it == earlier_->end()) return nullptr;
+    const bool is_embedded = std::get<const EncodedImage*>(key) != nullptr;
+    return is_embedded || file.has_kept(it->second.file) ? &it->second : nullptr;
 }
 
 const PixelBuffer& TextureCache::load(const std::string& path, bool raw) {
@@ -68,8 +83,7 @@ const PixelBuffer& TextureCache::decode(const EncodedImage& image, bool raw) {
 
 size_t TextureCache::memory_bytes() const {
     size_t sum = 0;
-    for (const auto& [key, image] : images_)
-        if (image) sum += image->memory_bytes();
+    for (const auto& [key, entry] : images_) sum += entry.image->memory_bytes();
     return sum;
 }
 

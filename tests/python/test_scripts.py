@@ -56,6 +56,30 @@ def test_chaos_tells_bits_that_differ_and_tests_that_crash(tmp_path: Path) -> No
     assert "| `upg+bdpt` | 2 | 2 | 12 | **no** |" in table
 
 
+def test_images_of_mitsuba_are_left_out_where_it_is_missing(tmp_path: Path) -> None:
+    write_program(tmp_path / "python", "exit 1")
+    for arguments, message in (
+        (["--mitsuba", str(tmp_path / "python")], f"{tmp_path}/python does not have the package mitsuba"),
+        ([], "--mitsuba PYTHON is missing"),
+    ):
+        run = subprocess.run([sys.executable, str(ROOT / "bench" / "mitsuba-images"), "run", str(tmp_path / "a.json"), *arguments],
+                             capture_output=True, text=True)
+        assert (run.returncode, run.stderr) == (0, f"mitsuba-images: {message}: nothing is rendered\n")
+    assert not (tmp_path / "a.json").exists()
+
+
+def test_images_for_mitsuba_have_a_box_filter() -> None:
+    loader = importlib.machinery.SourceFileLoader("mitsuba_images", str(ROOT / "bench" / "mitsuba-images"))
+    sys.path.insert(0, str(ROOT / "bench"))
+    script = types.ModuleType("mitsuba_images")
+    script.__file__ = loader.path
+    loader.exec_module(script)
+    box = '<film type="hdrfilm"><rfilter type="box"/></film>'
+    for text in ('<film type="hdrfilm"><rfilter type="gaussian"/></film>', '<film type="hdrfilm"></film>',
+                 '<film type="hdrfilm"><rfilter type="gaussian">\n<float name="stddev" value="1"/></rfilter></film>'):
+        assert script.with_box_filter(text) == box
+
+
 def test_the_model_of_ranks_has_the_pace_of_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(ROOT / "bench"))
     import ranks_model

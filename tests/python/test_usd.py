@@ -379,7 +379,7 @@ def test_the_program_reads_stages(tmp_path: Path, program: str) -> None:
     expected = image(load(tmp_path, text, variants={"/Thing": {"form": "box"}}))
     expect_same(image(et.load(out)), expected, 1e-5)
     expect_same(et.read_image(picture), expected, 1e-5)
-    wrong = write(tmp_path, 'def Mesh "M" { int[] faceVertexCounts = [3] }', name="wrong.usda")
+    wrong = write(tmp_path, 'def "A" (references = @missing.usda@) {}', name="wrong.usda")
     reasons = []
     for command in ([program, "convert", wrong, out], [sys.executable, "-m", "etendue.usd", wrong, out]):
         failed = subprocess.run(command, capture_output=True, text=True)
