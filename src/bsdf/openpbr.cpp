@@ -35,13 +35,14 @@
 //   - The coat is isotropic and does not darken its base by reflections between them, and there is no subsurface scattering,
 //     dispersion, thin film or emission.
 // A thin-walled material, and one with transmission, has its opaque part on both sides; other ones reflect on the front alone.
-// The albedo of white surfaces is 1 within 0.5 %, for roughnesses from 0 to 1, within 0.3 % with coat and fuzz together, and
+// The albedo of white surfaces is 1 within 0.5 %, for roughnesses from 0 to 1 and anisotropies up to 0.95, within 0.3 % with coat and fuzz together, and
 // within 1 % where the roughness of coat or fuzz is a texture. Within 6° of the horizon it is 1 within 1.4 % where the
 // roughness of the facets is a texture.
 
 #include "bsdf/openpbr.h"
 
 #include <algorithm>
+#include <initializer_list>
 
 #include "bsdf/material.h"
 #include "bsdf/thindielectric.h"
@@ -66,6 +67,10 @@ Rgb dip(Rgb F0, Rgb tint) {
                              (1 - kCos82) * (1 - kCos82);
     return schlick(F0, kCos82) * (Rgb(1) - tint) / kShape;
 }
+Vec3 half_vector(Vec3 a, Vec3 b) {
+    const Vec3 h = a + b;
+    return h * (1 / length(h));
+}
 Rgb at_least_zero(Rgb c) {
     return {c.r > 0 ? c.r : 0.0f, c.g > 0 ? c.g : 0.0f, c.b > 0 ? c.b : 0.0f};
 }
@@ -78,6 +83,7 @@ OpenPbrLobe::Fixed::Fixed(const OpenPbrLobe& lobe)
 OpenPbrLobe::Fixed::Fixed(const OpenPbrLobe& lobe, float alpha)
     : table(*lobe.table), row(table.mean_row(alpha, lobe.eta)), facets(lobe.facets_of(alpha)),
       is_glass(lobe.is_glass()), is_smooth(facets_are_smooth(facets)), tint(lobe.tint),
+      is_white(tint == Rgb(1)), most_tint(tint.max()), most_color(lobe.color.max()),
       metal(is_glass ? 0.0f : float(lobe.metal)) {
     has_facets = is_glass || metal > 0 || lobe.eta != 1;
     if (!is_glass && metal < 1) interreflection = table.interreflection(row);
@@ -108,9 +114,10 @@ Rgb OpenPbrLobe::fresnel(const Fixed& fixed, float cos_m) const {
     if (fixed.metal < 1) F = fixed.tint * (fresnel_dielectric(cos_m, eta).R * (1 - fixed.metal));
     if (fixed.metal > 0) {
         const float rest = 1 - cos_m;
-        F += at_least_zero(schlick(color, cos_m) -
-                           dip(color, fixed.tint) * (cos_m * pow5(rest) * rest)) *
-             fixed.metal;
+        Rgb metal_F = schlick(color, cos_m);
+        if (!fixed.is_white)
+            metal_F = at_least_zero(metal_F - dip(color, fixed.tint) * (cos_m * pow5(rest) * rest));
+        F += metal_F * fixed.metal;
     }
     return F;
 }
@@ -145,8 +152,9 @@ OpenPbrLobe::End OpenPbrLobe::end(const Fixed& fixed, Vec3 w) const {
     if (!fixed.is_covered) return e;
     if (is_above) {
         const OpenPbrLayers& layers = t.layers();
+        // The table of a textured roughness is interpolated towards rough coats.
         if (fixed.coat > 0)
-            e.coat = fixed.coat * (fixed.has_smooth_coat
+            e.coat = fixed.coat * (fixed.has_smooth_coat && layers.constants().coat_roughness_varies
                                        ? fresnel_dielectric(e.cos, layers.constants().coat_eta).R
                                        : layers.coat_albedo(fixed.layers, e.place));
         if (fixed.fuzz > 0) e.fuzz = fixed.fuzz * layers.fuzz_albedo(fixed.layers, e.place);
@@ -164,14 +172,14 @@ OpenPbrLobe::End OpenPbrLobe::end(const Fixed& fixed, Vec3 w) const {
 
 float OpenPbrLobe::facet_probability(const Fixed& fixed, const End& e) const {
     if (fixed.is_glass || fixed.metal == 1) return 1 - e.lost;
-    const float top = fixed.tint.max(), facets = e.facets * top,
-                diffuse = (1 - e.facets) * std::max(color.max(), fixed.interreflection * top);
+    const float facets = e.facets * fixed.most_tint,
+                diffuse = (1 - e.facets) *
+                          std::max(fixed.most_color, fixed.interreflection * fixed.most_tint);
     const float p = facets > 0 ? facets / (facets + diffuse) : 0;
     return fixed.metal > 0 ? lerp(fixed.metal, p, 1 - e.lost) : p;
 }
 
-BsdfEval OpenPbrLobe::eval_facets(const Fixed& fixed, const End& o, const End& i) const {
-    const Vec3 h = o.w + i.w, m = h / length(h);
+BsdfEval OpenPbrLobe::eval_facets(const Fixed& fixed, const End& o, const End& i, Vec3 m) const {
     if (!(m.z > 0)) return {};  // opposite grazing directions: not resolved by float
     const float quarter_D = 0.25f * fixed.facets.D(m), pdf = quarter_D / fixed.facets.sigma(o.w),
                 over_sigma_i = 1 / fixed.facets.sigma(i.w);
@@ -183,8 +191,9 @@ Rgb OpenPbrLobe::diffuse_base(const Fixed& fixed, const End& o, const End& i) co
     const OpenPbrTable& t = fixed.table;
     const Rgb tint = fixed.tint;
     const float mean = t.mean(OpenPbrTable::kFacets, fixed.row);
-    const Rgb separable =
-        (Rgb(1) - tint * o.facets) * (Rgb(1) - tint * i.facets) / (Rgb(1 + 1e-6f) - tint * mean);
+    const Rgb separable = fixed.is_white ? Rgb((1 - o.facets) * (1 - i.facets) / (1 + 1e-6f - mean))
+                                         : (Rgb(1) - tint * o.facets) * (Rgb(1) - tint * i.facets) /
+                                               (Rgb(1 + 1e-6f) - tint * mean);
     const float again = fixed.interreflection, roughness = diffuse_roughness;
     if (!(roughness > 0)) return separable * lerp(again, color, tint);
     // min(g(o), g(i)) f_FON, and what these leave, coloured as in EON.
@@ -206,9 +215,9 @@ Rgb OpenPbrLobe::diffuse_base(const Fixed& fixed, const End& o, const End& i) co
                 separable * tint);
 }
 
-BsdfEval OpenPbrLobe::eval_opaque(const Fixed& fixed, const End& o, const End& i) const {
+BsdfEval OpenPbrLobe::eval_opaque(const Fixed& fixed, const End& o, const End& i, Vec3 m) const {
     BsdfEval e;
-    if (fixed.has_facets && !fixed.is_smooth) e = eval_facets(fixed, o, i);
+    if (fixed.has_facets && !fixed.is_smooth) e = eval_facets(fixed, o, i, m);
     Rgb wide;
     if (fixed.metal < 1) wide = diffuse_base(fixed, o, i) * (1 - fixed.metal);
     if (fixed.metal > 0 && o.lost * i.lost > 0)
@@ -251,8 +260,8 @@ BsdfEval OpenPbrLobe::eval_glass(const Fixed& fixed, const End& o, const End& i,
     return e;
 }
 
-BsdfEval OpenPbrLobe::eval_slab(const Fixed& fixed, const End& o, const End& i) const {
-    if (!fixed.is_glass) return eval_opaque(fixed, o, i);
+BsdfEval OpenPbrLobe::eval_slab(const Fixed& fixed, const End& o, const End& i, Vec3 m) const {
+    if (!fixed.is_glass) return eval_opaque(fixed, o, i, m);
     return eval_glass(fixed, o, i, fixed.is_smooth ? BsdfEval{} : glass(fixed).eval(o.w, i.w));
 }
 
@@ -276,7 +285,7 @@ Rgb OpenPbrLobe::passed(const Fixed& fixed, const End& o, const End& i) const {
 }
 
 BsdfEval OpenPbrLobe::covered(const Fixed& fixed, const BsdfEval& slab_value, const End& o,
-                              const End& i) const {
+                              const End& i, Vec3 m) const {
     BsdfEval e = slab_value;
     e.f *= passed(fixed, o, i);
     e.pdf *= o.p_slab;
@@ -294,9 +303,7 @@ BsdfEval OpenPbrLobe::covered(const Fixed& fixed, const BsdfEval& slab_value, co
         if (fixed.coat > 0) returned *= lerp(fixed.coat, Rgb(1), fixed.coat_color);
         if (mean > 0) e.f += returned * (o.excess * i.excess / mean * i.cos * kInvPi);
     }
-    if (!is_above || !(fixed.fuzz > 0 || fixed.has_rough_coat)) return e;
-    const Vec3 h = o.w + i.w, m = h / length(h);
-    if (!(m.z > 0)) return e;
+    if (!is_above || !(fixed.fuzz > 0 || fixed.has_rough_coat) || !(m.z > 0)) return e;
     const OpenPbrLayers& layers = fixed.table.layers();
     if (fixed.fuzz > 0)
         e.f += Rgb(fuzz_color) *
@@ -315,8 +322,10 @@ BsdfEval OpenPbrLobe::covered(const Fixed& fixed, const BsdfEval& slab_value, co
 }
 
 BsdfEval OpenPbrLobe::eval(const Fixed& fixed, const End& o, const End& i) const {
-    const BsdfEval e = eval_slab(fixed, o, i);
-    return fixed.is_covered ? covered(fixed, e, o, i) : e;
+    // Bare glass has its own facets.
+    const Vec3 m = fixed.is_glass && !fixed.is_covered ? Vec3() : half_vector(o.w, i.w);
+    const BsdfEval e = eval_slab(fixed, o, i, m);
+    return fixed.is_covered ? covered(fixed, e, o, i, m) : e;
 }
 
 BsdfEval OpenPbrLobe::eval(Vec3 wo, Vec3 wi) const {
@@ -363,7 +372,7 @@ std::optional<BsdfSample> OpenPbrLobe::sample(Vec3 wo, float u_lobe, Vec2 u) con
     const End i = end(fixed, single->wi);
     BsdfEval e = eval_glass(
         fixed, o, i, {single->weight * single->pdf, single->pdf, single->pdf_rev, single->eta});
-    if (fixed.is_covered) e = covered(fixed, e, o, i);
+    if (fixed.is_covered) e = covered(fixed, e, o, i, half_vector(o.w, i.w));
     return make_sample(single->wi, e);
 }
 
@@ -512,50 +521,26 @@ public:
         glass.has_metal = glass.has_dielectric = true;
         opaque_ = SharedOpenPbrTable::of(OpenPbrSlab::Opaque, opaque);
         glass_ = SharedOpenPbrTable::of(OpenPbrSlab::Glass, glass);
+        const auto vary = [](std::initializer_list<const TextureRef*> textures) {
+            return std::any_of(textures.begin(), textures.end(),
+                               [](const TextureRef* t) { return !t->is_constant(); });
+        };
+        surface_varies_ =
+            vary({&specular_weight_, &specular_color_, &roughness_, &coat_, &coat_roughness_});
+        varies_ = surface_varies_ || vary({&base_weight_, &base_color_, &diffuse_roughness_,
+                                           &metalness_, &transmission_, &transmission_color_,
+                                           &coat_color_, &fuzz_, &fuzz_color_, &fuzz_roughness_});
+        evaluate<true>(TexturePoint(), constant_);
     }
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
-        const TexturePoint at = point.texture_point();
-        const float metal = metalness_.eval_scalar(at),
-                    glass = (1 - metal) * transmission_.eval_scalar(at);
-        const Surface s = surface(at);
-        OpenPbrLobe lobe{.table = nullptr,
-                         .color = base_color_.eval(at) * base_weight_.eval_scalar(at),
-                         .eta = s.eta,
-                         .tint = s.tint,
-                         .surface_roughness = s.roughness,
-                         .diffuse_roughness = diffuse_roughness_.eval_scalar(at),
-                         .metal = metal,
-                         .coat = s.coat,
-                         .coat_roughness = s.coat_roughness,
-                         .fuzz = 0,
-                         .fuzz_roughness = 0,
-                         .coat_color = {},
-                         .fuzz_color = {}};
-        if (constants_.has_coat) lobe.coat_color = coat_color_.eval(at);
-        if (constants_.has_fuzz) {
-            lobe.fuzz = fuzz_.eval_scalar(at);
-            lobe.fuzz_roughness = fuzz_roughness_.eval_scalar(at);
-            lobe.fuzz_color = fuzz_color_.eval(at);
-        }
-        const Frame reflecting =
-            is_two_sided() && !sees_front(point, frame) ? frame.flipped() : frame;
-        if (glass < 1) {
-            lobe.table = &opaque_->get();
-            if (glass > 0) lobe.metal = metal / (1 - glass);
-            list.add(reflecting, lobe, weight * (1 - glass));
-        }
-        if (!(glass > 0)) return;
-        lobe.eta = s.eta_of_glass;
-        const Rgb transmitted = transmission_color_.eval(at);
-        if (is_thin_)
-            return list.add(frame, ThinDielectricLobe{lobe.eta, s.tint, transmitted},
-                            weight * glass);
-        lobe.table = &glass_->get();
-        lobe.color = sqrt(transmitted);
-        list.add(frame, lobe, weight * glass);
+        if (!varies_) return append(constant_, point, frame, weight, list);
+        Values v = constant_;
+        evaluate<false>(point.texture_point(), v);
+        append(v, point, frame, weight, list);
     }
+    bool needs_tangents() const override { return constants_.aspect != 1; }
     bool is_transmissive() const override { return may_be(transmission_); }
     bool is_two_sided() const override { return is_transmissive() || is_thin_; }
     bool may_be_smooth() const override {
@@ -641,12 +626,64 @@ private:
         return s;
     }
 
+    /// What the parameters are at a point; the lobe has no table yet.
+    struct Values {
+        OpenPbrLobe lobe{};
+        Rgb transmitted;
+        float eta_of_glass = 1, metal = 0, transmission = 0;
+    };
+    /// Sets the values of textures, or `all`.
+    template <bool all>
+    void evaluate(const TexturePoint& at, Values& v) const {
+        const auto varies = [](const TextureRef& t) { return all || !t.is_constant(); };
+        OpenPbrLobe& l = v.lobe;
+        if (varies(base_color_) || varies(base_weight_))
+            l.color = base_color_.eval(at) * base_weight_.eval_scalar(at);
+        if (varies(diffuse_roughness_)) l.diffuse_roughness = diffuse_roughness_.eval_scalar(at);
+        if (varies(metalness_)) v.metal = metalness_.eval_scalar(at);
+        if (varies(transmission_)) v.transmission = transmission_.eval_scalar(at);
+        if (varies(transmission_color_)) v.transmitted = transmission_color_.eval(at);
+        if (all || surface_varies_) {
+            const Surface s = surface(at);
+            l.eta = s.eta, l.tint = s.tint, l.surface_roughness = s.roughness;
+            l.coat = s.coat, l.coat_roughness = s.coat_roughness;
+            v.eta_of_glass = s.eta_of_glass;
+        }
+        if (constants_.has_coat && varies(coat_color_)) l.coat_color = coat_color_.eval(at);
+        if (!constants_.has_fuzz) return;
+        if (varies(fuzz_)) l.fuzz = fuzz_.eval_scalar(at);
+        if (varies(fuzz_roughness_)) l.fuzz_roughness = fuzz_roughness_.eval_scalar(at);
+        if (varies(fuzz_color_)) l.fuzz_color = fuzz_color_.eval(at);
+    }
+    void append(const Values& v, const SurfacePoint& point, const Frame& frame, float weight,
+                ComponentList& list) const {
+        const float glass = (1 - v.metal) * v.transmission;
+        const Frame reflecting =
+            is_two_sided() && !sees_front(point, frame) ? frame.flipped() : frame;
+        OpenPbrLobe lobe = v.lobe;
+        if (glass < 1) {
+            lobe.table = &opaque_->get();
+            lobe.metal = glass > 0 ? v.metal / (1 - glass) : v.metal;
+            list.add(reflecting, lobe, weight * (1 - glass));
+        }
+        if (!(glass > 0)) return;
+        if (is_thin_)
+            return list.add(frame, ThinDielectricLobe{v.eta_of_glass, lobe.tint, v.transmitted},
+                            weight * glass);
+        lobe.table = &glass_->get();
+        lobe.eta = v.eta_of_glass;
+        lobe.color = sqrt(v.transmitted);
+        list.add(frame, lobe, weight * glass);
+    }
+
     TextureRef base_weight_, base_color_, diffuse_roughness_, metalness_, specular_weight_,
         specular_color_, roughness_, transmission_, transmission_color_, coat_, coat_color_,
         coat_roughness_, fuzz_, fuzz_color_, fuzz_roughness_;
     float ior_, coat_ior_, coat_affect_ior_, coat_affect_roughness_;
     bool is_thin_;
     OpenPbrConstants constants_;
+    Values constant_;
+    bool surface_varies_ = false, varies_ = false;
     std::shared_ptr<const SharedOpenPbrTable> opaque_, glass_;
 };
 

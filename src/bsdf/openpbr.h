@@ -68,6 +68,8 @@ private:
         bool is_glass, is_smooth, has_facets = true, is_covered = false;
         bool has_smooth_coat = false, has_rough_coat = false;
         Rgb tint;
+        bool is_white;  ///< The tint is.
+        float most_tint, most_color;
         float metal, interreflection = 0;
         float coat = 0, coat_alpha = 0, fuzz = 0;
         Rgb coat_color{1};
@@ -115,8 +117,9 @@ private:
 
     std::optional<BsdfSample> delta_event(const Fixed& fixed, const End& o, bool transmits) const;
     BsdfEval eval(const Fixed& fixed, const End& o, const End& i) const;
-    BsdfEval eval_slab(const Fixed& fixed, const End& o, const End& i) const;
-    BsdfEval eval_opaque(const Fixed& fixed, const End& o, const End& i) const;
+    /// `m`: the half vector of both directions.
+    BsdfEval eval_slab(const Fixed& fixed, const End& o, const End& i, Vec3 m) const;
+    BsdfEval eval_opaque(const Fixed& fixed, const End& o, const End& i, Vec3 m) const;
     BsdfEval eval_glass(const Fixed& fixed, const End& o, const End& i,
                         const BsdfEval& single) const;
     /// π times the BSDF of the diffuse base.
@@ -125,10 +128,11 @@ private:
         return {fixed.facets, eta, fixed.tint, color};
     }
     /// One reflection at rough facets.
-    BsdfEval eval_facets(const Fixed& fixed, const End& o, const End& i) const;
+    BsdfEval eval_facets(const Fixed& fixed, const End& o, const End& i, Vec3 m) const;
     /// Factor of the slab's light by the layers above.
     Rgb passed(const Fixed& fixed, const End& o, const End& i) const;
-    BsdfEval covered(const Fixed& fixed, const BsdfEval& slab, const End& o, const End& i) const;
+    BsdfEval covered(const Fixed& fixed, const BsdfEval& slab, const End& o, const End& i,
+                     Vec3 m) const;
 };
 
 }  // namespace etendue
