@@ -253,6 +253,19 @@ def test_exports_for_mitsuba_look_the_same_there(studio, tmp_path):
     assert np.abs(blocks[0] - blocks[1]).max() < 0.06 * blocks[1].max()
 
 
+def test_skies_are_images_for_mitsuba(studio, tmp_path):
+    """With their sun: the image is as bright as 32-bit numbers need."""
+    tree, background = studio.world(strength=0.05)
+    sky = tree.nodes.new("ShaderNodeTexSky")
+    sky.sun_elevation, sky.sun_size = 0.6, 0.03
+    tree.links.new(sky.outputs[0], background.inputs["Color"])
+    studio.plane(material=studio.material("ShaderNodeBsdfDiffuse")[0])
+    studio.sphere(studio.material("ShaderNodeBsdfDiffuse", "Ball")[0], at=(0, 0, 0.5), radius=0.5)
+    ours = studio.render()
+    theirs = in_mitsuba(studio, tmp_path / "exported")
+    assert theirs.mean(axis=(0, 1)) == pytest.approx(ours.mean(axis=(0, 1)), rel=0.02)
+
+
 WHITE, COLOR = (1.0, 1.0, 1.0), (0.7, 0.3, 0.2)
 # name: inputs, and the ratio of the image in Mitsuba 3 to ours.
 PRINCIPLED = {
