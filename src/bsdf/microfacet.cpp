@@ -136,7 +136,7 @@ Vec3 Microfacet::sample_visible(Vec3 w, Vec2 u) const {
     const Vec3 w_std = normalize({alpha_x_ * w.x, alpha_y_ * w.y, w.z});
     const Vec3 m =
         kind_ == Kind::Ggx ? sample_visible_ggx(w_std, u) : sample_visible_beckmann(w_std, u);
-    return normalize({alpha_x_ * m.x, alpha_y_ * m.y, std::fmax(m.z, 1e-7f)});
+    return normalize({alpha_x_ * m.x, alpha_y_ * m.y, std::max(1e-7f, m.z)});
 }
 
 }  // namespace etendue

@@ -68,14 +68,14 @@ public:
     float G1(Vec3 w) const { return std::fabs(w.z) / sigma(w); }
 
     /// Solid-angle density of sample_visible(w): D_w(m), with w.z > 0.
-    float pdf_visible(Vec3 w, Vec3 m) const { return std::fmax(dot(w, m), 0.0f) * D(m) / sigma(w); }
+    float pdf_visible(Vec3 w, Vec3 m) const { return std::max(0.0f, dot(w, m)) * D(m) / sigma(w); }
     /// A normal with density D_w(m), for w.z > 0: GGX by spherical caps [Dupuy & Benyoub 2023],
     /// Beckmann by inverting the slope distribution [Heitz & d'Eon 2014].
     Vec3 sample_visible(Vec3 w, Vec2 u) const;
 
     float alpha_x() const { return alpha_x_; }
     float alpha_y() const { return alpha_y_; }
-    float min_alpha() const { return std::fmin(alpha_x_, alpha_y_); }
+    float min_alpha() const { return std::min(alpha_x_, alpha_y_); }
     Kind kind() const { return kind_; }
 
 private:

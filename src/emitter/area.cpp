@@ -19,8 +19,8 @@ class AreaEmitter final : public Emitter {
 public:
     AreaEmitter(const Shape& shape, TextureRef radiance, bool two_sided,
                 std::function<float(const TexturePoint& at)> opacity)
-        : shape_(shape), radiance_(radiance), two_sided_(two_sided), opacity_(std::move(opacity)),
-          leaves_out_hidden_(!two_sided || !opacity_) {
+        : Emitter(Extent::Surface), shape_(shape), radiance_(radiance), two_sided_(two_sided),
+          opacity_(std::move(opacity)), leaves_out_hidden_(!two_sided || !opacity_) {
         const size_t n = shape.primitive_count();
         std::vector<double> weights(n), areas(n);
         double flux = 0, floor = 0;
@@ -91,7 +91,7 @@ public:
         const Vec3 wi = v * (1 / dist);
         const float cos = emitted_cos(s.ng, -wi);
         if (!(cos > 0)) return false;
-        const float pdf = direct_pdf(s.p, s.ng, s.prim, from);
+        const float pdf = pdf_[s.prim] * s.density;
         if (!(pdf > 0)) return false;
         out = {s.p,
                s.ng,
@@ -132,7 +132,6 @@ public:
     float opacity(Vec2 uv, uint32_t prim) const override {
         return opacity_ ? opacity_(texture_point(uv, prim)) : 1.0f;
     }
-    bool is_area() const override { return true; }
     float slack(uint32_t prim) const override { return shape_.slack(prim); }
     float max_pdf_d() const override { return pdf_direction(1); }
     bool emits_by_cosine() const override { return !two_sided_; }

@@ -56,6 +56,10 @@ struct EmitterHit {
 
 class Emitter {
 public:
+    /// What its points are; `Direction` is a single one at infinity.
+    enum class Extent : uint8_t { Surface, Point, Infinite, Direction };
+
+    explicit Emitter(Extent extent) : extent_(extent) {}
     virtual ~Emitter() = default;
 
     /// `u_y0` also chooses among primitives or texels, hence its precision.
@@ -110,11 +114,11 @@ public:
     };
     virtual Disc disc() const { return {}; }
 
-    virtual bool is_infinite() const { return false; }
+    bool is_infinite() const { return extent_ == Extent::Infinite || extent_ == Extent::Direction; }
     /// Whether it has no extent, so that no eye path hits it.
-    virtual bool is_delta() const { return false; }
+    bool is_delta() const { return extent_ == Extent::Point || extent_ == Extent::Direction; }
     /// Whether it has a surface, so that |cos θ| at y_0 is part of G.
-    virtual bool is_area() const { return false; }
+    bool is_area() const { return extent_ == Extent::Surface; }
     /// SurfaceGeometry::slack of the points of its surface.
     virtual float slack(uint32_t /*prim*/) const { return 0; }
     virtual void set_scene_bounds(Vec3 /*center*/, float /*radius*/) {}
@@ -125,6 +129,9 @@ public:
     /// MediumId of the medium in which its light starts, see Scene::medium_at().
     int16_t medium = -1;
     int16_t medium_behind = -1;  ///< The same where it starts at the back of a boundary.
+
+private:
+    Extent extent_;
 };
 
 /// Services of the scene builder for the construction of emitters.

@@ -68,11 +68,11 @@ private:
 
 class DirectionalEmitter final : public InfiniteEmitter {
 public:
-    DirectionalEmitter(Vec3 travel, Rgb irradiance) : d_(-travel), E_(irradiance) {}
+    DirectionalEmitter(Vec3 travel, Rgb irradiance)
+        : InfiniteEmitter(Extent::Direction), d_(-travel), E_(irradiance) {}
     double power() const override {
         return std::numbers::pi * sqr(double(scene_radius())) * luminance(E_);
     }
-    bool is_delta() const override { return true; }
 
 private:
     Sample sample_arrival(FinePoint) const override { return {d_, E_, 1}; }

@@ -8,6 +8,8 @@ namespace etendue {
 /// An emitter whose points are directions. Light that arrives from direction `d` travels along -d.
 class InfiniteEmitter : public Emitter {
 public:
+    explicit InfiniteEmitter(Extent extent = Extent::Infinite) : Emitter(extent) {}
+
     EmissionSample sample_emission(FinePoint u_y0, Vec2 u_d) const final;
     EmissionSample sample_emission_from(Vec3 d, Vec2 u_d) const final;
     bool sample_direct(Vec3 from, FinePoint u, DirectSample& out) const final;
@@ -15,7 +17,6 @@ public:
     Emission eval_emission(Vec3 ng, Vec2 uv, uint32_t prim, Vec3 w) const final;
     /// Always the direction of y_0; only the point on the bounding disc varies.
     Vec3 sample_direction(Vec3 ng, Vec2) const final { return ng; }
-    bool is_infinite() const final { return true; }
     Disc disc() const final { return {center_, radius_}; }
     void set_scene_bounds(Vec3 center, float radius) final;
 

@@ -13,7 +13,7 @@ namespace etendue {
 /// An emitter at a point, with the same intensity in all directions unless derived.
 class PointEmitter : public Emitter {
 public:
-    PointEmitter(Vec3 p, Rgb intensity) : p_(p), intensity_(intensity) {}
+    PointEmitter(Vec3 p, Rgb intensity) : Emitter(Extent::Point), p_(p), intensity_(intensity) {}
 
     EmissionSample sample_emission(FinePoint, Vec2 u_d) const override {
         const Vec3 d = sample_direction({}, u_d);
@@ -38,7 +38,6 @@ public:
     Vec3 sample_direction(Vec3, Vec2 u) const override { return sample_uniform_sphere(u); }
     float max_pdf_d() const override { return kUniformSpherePdf; }
     double power() const override { return 4 * std::numbers::pi * luminance(intensity_); }
-    bool is_delta() const override { return true; }
 
 protected:
     virtual Rgb intensity(Vec3) const { return intensity_; }

@@ -380,8 +380,8 @@ ShapeSample Sphere::sample_seen(uint32_t prim, Vec3 from, Vec2 u) const {
     };
     const Direction in_axes{along(axes_[0]), along(axes_[1]), along(axes_[2])};
     const SurfaceGeometry g = at(in_axes);
-    return {g.p, g.ng, parameters({float(in_axes.x), float(in_axes.y), float(in_axes.z)}), 0,
-            g.slack};
+    return {g.p, g.ng,    parameters({float(in_axes.x), float(in_axes.y), float(in_axes.z)}),
+            0,   g.slack, seen_density(prim, g.p, g.ng, from)};
 }
 
 float Sphere::seen_density(uint32_t, Vec3 p, Vec3 ng, Vec3 from) const {

@@ -36,7 +36,8 @@ struct ShapeSample {
     Vec3 p, ng;
     Vec2 uv;  ///< Parameters within the primitive, as in RayHit.
     uint32_t prim;
-    float slack = 0;  ///< As SurfaceGeometry::slack.
+    float slack = 0;    ///< As SurfaceGeometry::slack.
+    float density = 1;  ///< Shape::seen_density() of what sample_seen() returns.
 };
 
 class Shape {

@@ -1,6 +1,7 @@
 #pragma once
 // Tabulated distributions: alias table over indices, piecewise-constant densities in one and two dimensions.
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <span>
@@ -13,7 +14,7 @@ namespace etendue {
 
 /// (i + u) / n: the point u in [0, 1) of the i-th of n equal parts of [0, 1); always below 1.
 inline double stratum(int i, int n, double u) {
-    return std::fmin((double(i) + u) / double(n), 0x1.fffffffffffffp-1);
+    return std::min(0x1.fffffffffffffp-1, (double(i) + u) / double(n));
 }
 
 /// Draws an index with probability proportional to its weight in constant time [Walker 1977; Vose 1991].

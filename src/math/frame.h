@@ -44,7 +44,7 @@ constexpr float cos2_theta(Vec3 w) {
     return w.z * w.z;
 }
 inline float sin2_theta(Vec3 w) {
-    return std::fmax(0.0f, 1.0f - w.z * w.z);
+    return std::max(0.0f, 1.0f - w.z * w.z);
 }
 inline float tan2_theta(Vec3 w) {
     return sin2_theta(w) / cos2_theta(w);

@@ -33,7 +33,7 @@ struct FinePoint {
 };
 /// A number in [0, 1) rounded to float, kept below one.
 inline float to_float(double u) {
-    return std::fmin(float(u), kOneMinusEpsilon);
+    return std::min(kOneMinusEpsilon, float(u));
 }
 inline Vec2 to_float(FinePoint u) {
     return {to_float(u.x), to_float(u.y)};
