@@ -133,9 +133,8 @@ void add(BsdfEval& sum, const BsdfEval& e) {
 }  // namespace
 
 BsdfEval Bsdf::eval(Vec3 wo, Vec3 wi, TransportMode mode) const {
-    if (!first_.next)
-        if (const auto* diffuse = std::get_if<DiffuseLobe>(&first_.lobe))
-            return eval_diffuse(ng_, has_strict_normals_, first_, *diffuse, wo, wi, mode);
+    if (const DiffuseLobe* diffuse = only_diffuse_lobe())
+        return eval_diffuse(ng_, has_strict_normals_, first_, *diffuse, wo, wi, mode);
     BsdfEval sum = eval_component(ng_, has_strict_normals_, first_, wo, wi, mode);
     for (const BsdfComponent* c = first_.next; c; c = c->next)
         add(sum, eval_component(ng_, has_strict_normals_, *c, wo, wi, mode));
@@ -145,9 +144,8 @@ BsdfEval Bsdf::eval(Vec3 wo, Vec3 wi, TransportMode mode) const {
 }
 
 std::optional<BsdfSample> Bsdf::sample(Vec3 wo, float u_lobe, Vec2 u, TransportMode mode) const {
-    if (!first_.next)
-        if (const auto* diffuse = std::get_if<DiffuseLobe>(&first_.lobe))
-            return sample_diffuse(ng_, has_strict_normals_, first_, *diffuse, wo, u, mode);
+    if (const DiffuseLobe* diffuse = only_diffuse_lobe())
+        return sample_diffuse(ng_, has_strict_normals_, first_, *diffuse, wo, u, mode);
     if (!has_smooth_ && !has_delta_) return {};
     // Walks pass no number then. Others are not read either, so that every caller samples as walks do.
     if (!uses_lobe_choice_) u_lobe = 0;
@@ -155,7 +153,7 @@ std::optional<BsdfSample> Bsdf::sample(Vec3 wo, float u_lobe, Vec2 u, TransportM
     u_lobe *= total_weight_;
     for (; chosen->next && u_lobe >= chosen->weight; chosen = chosen->next)
         u_lobe -= chosen->weight;
-    u_lobe = std::fmin(u_lobe / chosen->weight, kOneMinusEpsilon);
+    u_lobe = std::min(kOneMinusEpsilon, u_lobe / chosen->weight);
     std::optional<BsdfSample> s =
         sample_component(ng_, has_strict_normals_, *chosen, wo, mode, [&](Vec3 local_wo) {
             return sample_lobe(chosen->lobe, local_wo, u_lobe, u);
@@ -214,11 +212,6 @@ float Bsdf::max_pdf(Vec3 wo, const DirectionCone& cone) const {
     return sum / total_weight_;
 }
 
-std::optional<Vec3> Bsdf::diffuse_normal() const {
-    if (first_.next || !std::holds_alternative<DiffuseLobe>(first_.lobe)) return {};
-    return first_.frame.n;
-}
-
 float Bsdf::sum_delta_probabilities(Vec3 wo, TransportMode mode) const {
     float sum = 0;
     int event = 0;
@@ -228,12 +221,12 @@ float Bsdf::sum_delta_probabilities(Vec3 wo, TransportMode mode) const {
     return sum;
 }
 
-float Bsdf::roughness() const {
+float Bsdf::sharpest_roughness() const {
     float sharpest = kInf;
     for (const BsdfComponent* c = &first_; c; c = c->next)
         std::visit(
             [&](const auto& l) {
-                if (c->weight > 0 && l.has_smooth()) sharpest = std::fmin(sharpest, l.roughness());
+                if (c->weight > 0 && l.has_smooth()) sharpest = std::min(sharpest, l.roughness());
             },
             c->lobe);
     return std::isfinite(sharpest) ? sharpest : 0;

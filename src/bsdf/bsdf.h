@@ -65,7 +65,9 @@ public:
     /// Upper bound of eval(wo, w).pdf over the directions w of a cone; kInf where none is known.
     float max_pdf(Vec3 wo, const DirectionCone& cone) const;
     /// Shading normal where the only lobe is diffuse, so that sampling has density cos θ/π about it; empty otherwise.
-    std::optional<Vec3> diffuse_normal() const;
+    std::optional<Vec3> diffuse_normal() const {
+        return only_diffuse_lobe() ? std::optional(first_.frame.n) : std::nullopt;
+    }
 
     /// Whether any lobe is smooth, so that connections are possible here.
     bool has_smooth() const { return has_smooth_; }
@@ -73,7 +75,7 @@ public:
     /// Whether sample() reads u_lobe.
     bool uses_lobe_choice() const { return uses_lobe_choice_; }
     /// α of the sharpest smooth lobe; 0 where all lobes are delta.
-    float roughness() const;
+    float roughness() const { return only_diffuse_lobe() ? 1.0f : sharpest_roughness(); }
     Rgb albedo_estimate() const;
     Vec3 shading_normal() const { return first_.frame.n; }
     /// First of the linked components.
@@ -82,6 +84,11 @@ public:
 private:
     friend class ComponentList;
     friend class ComponentArena;
+    /// The lobe where it is the only one and diffuse, the most frequent case; nullptr for others.
+    const DiffuseLobe* only_diffuse_lobe() const {
+        return first_.next ? nullptr : std::get_if<DiffuseLobe>(&first_.lobe);
+    }
+    float sharpest_roughness() const;
     float sum_delta_probabilities(Vec3 wo, TransportMode mode) const;
     /// A sample of sample_component(), with the probabilities of the components.
     BsdfSample normalized(BsdfSample s) const;

@@ -98,10 +98,10 @@ void PassImage::convolve(int row, int column, std::span<Rgb> to) const {
     // (i, j) has the weights in reverse order on the points (i, j) … (i + taps - 1, j + taps - 1) of the grid.
     const ReconstructionFilter::Taps x = filter_.taps(grid_->offset().x),
                                      y = filter_.taps(grid_->offset().y);
-    std::array<Rgb, kFilmChunk + ReconstructionFilter::kMostTaps> line;
+    constexpr size_t kRun = 256;
+    std::array<Rgb, kRun + ReconstructionFilter::kMostTaps> line;
     for (size_t done = 0; done < to.size();) {
-        const size_t count = std::min<size_t>(to.size() - done, kFilmChunk),
-                     points = count + size_t(x.count) - 1;
+        const size_t count = std::min(to.size() - done, kRun), points = count + size_t(x.count) - 1;
         const Rgb* from = &samples_[size_t(row) * size_t(grid_->columns()) + size_t(column) + done];
         std::fill_n(line.begin(), points, Rgb());
         for (int k = 0; k < y.count; ++k, from += grid_->columns()) {

@@ -96,14 +96,14 @@ std::optional<Rgb> Bidirectional::test_with_survival(const SampleContext& c, con
     return contribution * Tr;
 }
 
-std::optional<Rgb> Bidirectional::add(const SampleContext& c, const std::optional<Join>& j,
-                                      Workspace& work, float factor, uint32_t draw) const {
-    if (!j || j->technique.vertices() - 1 < shortest_) return {};
+std::optional<Rgb> Bidirectional::add_join(const SampleContext& c, const Join& j, Workspace& work,
+                                           float factor, uint32_t draw) const {
+    if (j.technique.vertices() - 1 < shortest_) return {};
     const float splat_scale = c.is_of_whole_film ? 1.0f : c.splat_scale,
-                scale = j->technique.t <= 1 ? splat_scale : std::fabs(work.z.film_weight);
-    const uint64_t number = join_number(j->technique.s, j->technique.t, draw);
-    const auto value = test(c, *j, scale * factor, number, work);
-    if (value) c.sink.add(*j, *value * factor);
+                scale = j.technique.t <= 1 ? splat_scale : std::fabs(work.z.film_weight);
+    const uint64_t number = join_number(j.technique.s, j.technique.t, draw);
+    const auto value = test(c, j, scale * factor, number, work);
+    if (value) c.sink.add(j, *value * factor);
     return value;
 }
 

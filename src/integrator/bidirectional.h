@@ -112,7 +112,9 @@ public:
     /// Adds the join, times `factor`, if it exists and passes test(), whose result is returned. If z_{t-1} has several
     /// joins of the same technique, `draw` distinguishes them.
     std::optional<Rgb> add(const SampleContext& c, const std::optional<Join>& join, Workspace& work,
-                           float factor = 1, uint32_t draw = 0) const;
+                           float factor = 1, uint32_t draw = 0) const {
+        return join ? add_join(c, *join, work, factor, draw) : std::nullopt;
+    }
     /// The contribution of a join after Russian roulette and the shadow ray; empty if either of them ends it. A unit of
     /// contribution adds `scale` to its pixel. `number` distinguishes the joins of one sample.
     std::optional<Rgb> test(const SampleContext& c, const Join& join, float scale, uint64_t number,
@@ -127,6 +129,8 @@ public:
     float threshold(const SampleContext& c) const { return threshold(c, nullptr); }
 
 private:
+    std::optional<Rgb> add_join(const SampleContext& c, const Join& join, Workspace& work,
+                                float factor, uint32_t draw) const;
     /// Threshold of join_survival() for contributions at a film point, or to the own pixel if `film` is nullptr.
     float threshold(const SampleContext& c, const Vec2* film) const;
 

@@ -7,6 +7,9 @@
 #include "math/rotated.h"
 
 namespace etendue {
+
+static_assert(sizeof(Join) <= 120 && sizeof(TechniqueCounts) <= 80);
+
 Rgb edge_attenuation(const Scene& scene, const Vertex& a, const Vertex& b, Vec3 a_to_b) {
     // If the two differ although no surface lies between them (an inconsistent scene), the choice does not depend on
     // the order of the vertices.

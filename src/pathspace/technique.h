@@ -130,8 +130,7 @@ struct TechniqueCounts {
 
     friend bool operator==(const TechniqueCounts&, const TechniqueCounts&) = default;
     bool uses_light_paths() const {
-        return connect > 0 || connect_emission > 0 || splat > 0 || hit_lens > 0 || merge > 0 ||
-               gather > 0;
+        return connect + connect_emission + splat + hit_lens + merge + gather > 0;
     }
     bool uses_pairs() const { return merge > 0 || gather > 0; }
     /// Whether a technique other than hits makes all paths with two neighbouring vertices that scatter by smooth lobes;

@@ -3,6 +3,11 @@
 #include "guide/guide.h"
 
 namespace etendue {
+
+// What walks and joins move most. A larger one costs memory traffic at every vertex.
+static_assert(sizeof(Vertex) <= 312 && sizeof(Bsdf) <= 144 && sizeof(BsdfSample) <= 44 &&
+              sizeof(SurfaceHit) <= 144);
+
 namespace {
 
 constexpr TransportMode other(TransportMode mode) {
