@@ -178,6 +178,7 @@ ApiOptions StudioCommand::api_options() const {
     options.token = make_token();
     options.scene_file = scene.file;
     options.output_folder = output;
+    options.threads = threads;
     if (!reference.empty()) {
         refuse_denoised_reference(reference, read_image(reference));
         options.reference = read_rgb(reference);

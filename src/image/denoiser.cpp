@@ -26,8 +26,9 @@ using Pixels = std::vector<Rgb>;
 /// A device of the library, on which all threads of a filter run.
 class OidnDevice {
 public:
-    OidnDevice(const OidnLibrary& oidn, int threads)
-        : oidn_(oidn), device_(oidn.new_device(OidnLibrary::kCpu)) {
+    /// `goes_on` must outlive the device; it may be empty.
+    OidnDevice(const OidnLibrary& oidn, int threads, const std::function<bool()>& goes_on)
+        : oidn_(oidn), goes_on_(goes_on), device_(oidn.new_device(OidnLibrary::kCpu)) {
         check();
         oidn_.set_device_int(device_, "numThreads", threads);
         // Threads of TBB are those of renderings, too.
@@ -64,6 +65,15 @@ public:
             if (!i.pixels.empty()) set(filter.get(), i.name, i.pixels);
         set(filter.get(), "output", output);
         for (const char* flag : flags) oidn_.set_filter_bool(filter.get(), flag, true);
+        if (goes_on_) {
+            oidn_.set_progress(
+                filter.get(),
+                [](void* data, double) {
+                    return (*static_cast<const std::function<bool()>*>(data))();
+                },
+                const_cast<std::function<bool()>*>(&goes_on_));
+            if (!goes_on_()) throw DenoisingCancelled();
+        }
         oidn_.commit_filter(filter.get());
         oidn_.execute_filter(filter.get());
         check();
@@ -73,12 +83,15 @@ public:
 private:
     void check() const {
         const char* message = nullptr;
-        if (oidn_.device_error(device_, &message) != OidnLibrary::kNoError || !device_)
+        const int error = oidn_.device_error(device_, &message);
+        if (error == OidnLibrary::kCancelled) throw DenoisingCancelled();
+        if (error != OidnLibrary::kNoError || !device_)
             throw std::runtime_error(fmt::format("Open Image Denoise failed: {}",
                                                  message ? message : "it has no device"));
     }
 
     const OidnLibrary& oidn_;
+    const std::function<bool()>& goes_on_;
     OidnLibrary::Device device_;
 };
 
@@ -129,20 +142,21 @@ Pixels layer(const Image& image, std::initializer_list<const char*> names) {
 }  // namespace
 
 Denoiser::Denoiser(const std::string& library) : library_(load(library)) {
-    const int version = OidnDevice(*library_, 1).version();
+    const int version = OidnDevice(*library_, 1, {}).version();
     name_ = fmt::format("Open Image Denoise {}.{}.{}", version / 10000, version / 100 % 100,
                         version % 100);
 }
 
 Denoiser::~Denoiser() = default;
 
-Image Denoiser::denoise(const Image& image, int threads) const {
+Image Denoiser::denoise(const Image& image, int threads,
+                        const std::function<bool()>& goes_on) const {
     if (is_denoised(image)) throw std::runtime_error("the image is denoised already");
     const int w = image.width, h = image.height;
     Pixels color = rgb_pixels(image), albedo = layer(image, {"denoise_albedo", "albedo"}), normal;
     // The library takes normals beside albedos alone.
     if (!albedo.empty()) normal = layer(image, {"denoise_normal", "normal"});
-    const OidnDevice device(*library_, threads);
+    const OidnDevice device(*library_, threads, goes_on);
     if (!albedo.empty()) albedo = device.filter(w, h, {{"albedo", albedo}}, {});
     if (!normal.empty()) normal = device.filter(w, h, {{"normal", normal}}, {});
     const Pixels output =

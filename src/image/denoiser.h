@@ -2,7 +2,9 @@
 // Removal of noise by Intel Open Image Denoise 2, a neural network [Áfra 2024]. The library is loaded at run time, so that
 // nothing else depends on it. Denoised images are biased; their metadata say that they are denoised.
 
+#include <functional>
 #include <memory>
+#include <stdexcept>
 #include <string>
 
 #include "image/image.h"
@@ -10,6 +12,10 @@
 namespace etendue {
 
 class OidnLibrary;
+
+struct DenoisingCancelled : std::runtime_error {
+    DenoisingCancelled() : std::runtime_error("the denoising was cancelled") {}
+};
 
 class Denoiser {
 public:
@@ -27,8 +33,9 @@ public:
     /// The colours of `image` without their noise, and its metadata, of which those that no longer hold are replaced. The
     /// layers "denoise_albedo" and "denoise_normal", or else "albedo" and "normal", guide it if they are there; their own
     /// noise is removed first. Colours are radiance. `threads`: 0 for one per core. Throws std::runtime_error for what is
-    /// denoised already.
-    Image denoise(const Image& image, int threads = 0) const;
+    /// denoised already, and DenoisingCancelled soon after `goes_on`, which must not throw, is false.
+    Image denoise(const Image& image, int threads = 0,
+                  const std::function<bool()>& goes_on = {}) const;
 
 private:
     std::unique_ptr<const OidnLibrary> library_;

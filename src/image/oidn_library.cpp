@@ -31,6 +31,7 @@ OidnLibrary::OidnLibrary(const std::string& file) {
     load(release_filter, "oidnReleaseFilter");
     load(set_image, "oidnSetSharedFilterImage");
     load(set_filter_bool, "oidnSetFilterBool");
+    load(set_progress, "oidnSetFilterProgressMonitorFunction");
     load(commit_filter, "oidnCommitFilter");
     load(execute_filter, "oidnExecuteFilter");
 }

@@ -14,9 +14,12 @@ public:
 
     using Device = struct OpaqueDevice*;
     using Filter = struct OpaqueFilter*;
-    static constexpr int kCpu = 1;      ///< OIDN_DEVICE_TYPE_CPU
-    static constexpr int kFloat3 = 3;   ///< OIDN_FORMAT_FLOAT3
-    static constexpr int kNoError = 0;  ///< OIDN_ERROR_NONE
+    static constexpr int kCpu = 1;        ///< OIDN_DEVICE_TYPE_CPU
+    static constexpr int kFloat3 = 3;     ///< OIDN_FORMAT_FLOAT3
+    static constexpr int kNoError = 0;    ///< OIDN_ERROR_NONE
+    static constexpr int kCancelled = 6;  ///< OIDN_ERROR_CANCELLED
+    /// Called while a filter is executed; false cancels it.
+    using Progress = bool (*)(void* data, double done);
 
     Device (*new_device)(int type);
     void (*release_device)(Device);
@@ -32,6 +35,7 @@ public:
     void (*set_image)(Filter, const char* name, void* pixels, int format, size_t width,
                       size_t height, size_t offset, size_t pixel_stride, size_t row_stride);
     void (*set_filter_bool)(Filter, const char* name, bool value);
+    void (*set_progress)(Filter, Progress, void* data);
     void (*commit_filter)(Filter);
     void (*execute_filter)(Filter);
 };

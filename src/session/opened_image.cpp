@@ -65,7 +65,10 @@ OpenedImage opened_image(std::string bytes, const std::string& file) {
     snapshot->width = image.width;
     snapshot->height = image.height;
     snapshot->mean = rgb_pixels(image);
-    return {.file = file, .note = note_of(image), .pixels = snapshot};
+    return {.file = file,
+            .note = note_of(image),
+            .pixels = snapshot,
+            .is_denoised = is_denoised(image)};
 }
 
 }  // namespace etendue

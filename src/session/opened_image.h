@@ -16,6 +16,7 @@ struct OpenedImage {
     /// Those of an image file are one pass without a variance.
     std::shared_ptr<const Snapshot> pixels;
     IntervalKind interval = IntervalKind::None;
+    bool is_denoised = false;
 };
 
 /// The image of a file with this name and these bytes, which are those of a checkpoint or of an image file. Of a run with

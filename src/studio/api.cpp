@@ -47,12 +47,21 @@ const std::array<PageFile, 11>& page_files() {
 }
 
 std::string hash_of(const std::string& text) {
+/// Toward what the sensor shows above; not normalised.
+Vec3 up_of(const Scene& scene) {
+    const auto [width, height] = std::pair{float(scene.film().width), float(scene.film().height)};
+    const SensorRay above = scene.sensor().sample_ray({width / 2, 0}, {0.5f, 0.5f}),
+                    below = scene.sensor().sample_ray({width / 2, height}, {0.5f, 0.5f});
+    return (above.p + above.d) - (below.p + below.d);
+}
+
     return fmt::format("\"{:016x}\"", ContentHash().add(text).value());
 }
 
 }  // namespace
 
-Api::Api(Session& session, ApiOptions options) : session_(session), options_(std::move(options)) {
+Api::Api(Session& session, ApiOptions options)
+    : session_(session), options_(std::move(options)), denoised_(session, options_.threads) {
     const std::filesystem::path folder = std::filesystem::path(options_.scene_file).parent_path();
     scene_folder_ = folder.empty() ? "." : folder.string();
     scene_file_version_ = file_version(options_.scene_file);
@@ -158,7 +167,7 @@ void Api::look_at_scene_file() {
 
 uint64_t Api::revision() {
     look_at_scene_file();
-    return session_.revision() + own_revision_ + opened_.version();
+    return session_.revision() + own_revision_ + opened_.version() + denoised_.version();
 }
 
 std::string Api::event() {
@@ -207,6 +216,8 @@ Reply Api::state() {
             scene->sensor().sample_ray({float(g.width) / 2, float(g.height) / 2}, {0.5f, 0.5f});
         j["scene"]["eye"] = to_json(eye.p);
         j["scene"]["look"] = to_json(eye.d);
+            {"up", to_json(up_of(*scene))},
+            {"filter_is_wide", scene->filter().is_wide()},
     }
     j["runs"] = json::array();
     for (const RunStatus& s : session_.runs()) j["runs"].push_back(to_json(s));
@@ -341,7 +352,7 @@ void Api::run(const json& body, const Done& done) {
     else if (action == "continue")
         session_.resume(id, limits_of(body));
     else if (action == "remove")
-        session_.remove(id);
+        session_.remove(id), denoised_.forget(id);
     else
         throw ApiError(422, "\"action\" must be start, stop, continue, discard, remove, open, "
                             "list, view or reload");

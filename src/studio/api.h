@@ -17,6 +17,7 @@
 #include "mcmc/user_paths.h"
 #include "session/session.h"
 #include "session/workers.h"
+#include "studio/denoised_images.h"
 #include "studio/http.h"
 #include "studio/opened_images.h"
 #include "studio/scene_data.h"
@@ -42,6 +43,7 @@ struct ApiOptions {
     std::vector<std::string> hosts;
     /// Changes what is loaded from the next Session::reload() on; empty: nothing can be changed.
     std::function<void(const SceneView&)> set_view = {};
+    int threads = 0;  ///< That remove noise while no run renders; 0: one per core.
 };
 
 class Api final : public Handler {
@@ -72,7 +74,7 @@ private:
     void open(const nlohmann::json& body, const Done& done);
     /// Opens an image whose file is the body, or removes one.
     void images(Request request, const Done& done);
-    /// The image of a run, or of a view of an opened image; nullptr where the run has none yet.
+    /// The image of a run, of a view of an opened image, or of the denoised image of a run; nullptr where there is none yet.
     std::shared_ptr<const Snapshot> shown(const std::string& run_or_view);
     void save(const nlohmann::json& body, const Done& done);
     Reply get_paths(const Request& request);
@@ -111,3 +113,4 @@ private:
 };
 
 }  // namespace etendue
+    DenoisedImages denoised_;

@@ -141,6 +141,16 @@ void Api::image(const Request& request, const Done& done) {
                                                shown->width, shown->height));
         });
     }
+    if (view == "denoised") {
+        const FilmGeometry& of_run = session_.scene_of(id)->film();
+        check_size(of_run.crop_width, of_run.crop_height, g);
+        const auto shown = denoised_.ask(id, after);
+        if (!shown || shown->passes <= after) return done(Reply::nothing());
+        part.passes = shown->passes;
+        return send(done, [shown, part] {
+            return encode_image(part, PixelRows<Rgb>(shown->mean, shown->width, shown->height));
+        });
+    }
     if (view != "image" && view != "variance" && view != "error")
         throw ApiError(404, fmt::format("there is no view \"{}\"", view));
     const auto shown = session_.snapshot(id);
@@ -158,6 +168,7 @@ void Api::image(const Request& request, const Done& done) {
 
 std::shared_ptr<const Snapshot> Api::shown(const std::string& run_or_view) {
     if (const auto opened = opened_.of_view(run_or_view)) return opened->pixels;
+    if (const auto run = DenoisedImages::run_of(run_or_view)) return denoised_.of_run(*run);
     return session_.snapshot(integer_of(run_or_view, "run"));
 }
 
@@ -177,12 +188,18 @@ void Api::images(Request request, const Done& done) {
 Reply Api::pixel(const Request& request) {
     const int x = query_integer(request, "x", -1), y = query_integer(request, "y", -1),
               w = query_integer(request, "w", 1), h = query_integer(request, "h", 1);
-    const auto opened = opened_.of_view(request.query("view").value_or(""));
-    const int id = opened ? 0 : query_integer(request, "run", 0);
-    const auto snapshot = opened ? opened->pixels : session_.snapshot(id);
+    const std::string view = request.query("view").value_or("");
+    const auto opened = opened_.of_view(view);
+    const std::optional<int> denoised = DenoisedImages::run_of(view);
+    const int id = opened ? 0 : denoised ? *denoised : query_integer(request, "run", 0);
+    const auto snapshot = opened     ? opened->pixels
+                          : denoised ? denoised_.of_run(id)
+                                     : session_.snapshot(id);
     if (!snapshot) return Reply::json(dump({{"run", id}, {"passes", 0}}));
     check({x, y, w, h}, snapshot->width, snapshot->height);
-    const IntervalKind interval = opened ? opened->interval : session_.status(id).interval;
+    const IntervalKind interval = opened     ? opened->interval
+                                  : denoised ? IntervalKind::None
+                                             : session_.status(id).interval;
     const RectangleValues values = values_in(*snapshot, {x, y, w, h});
     json j{{"run", id},           {"passes", snapshot->passes},
            {"mean", values.mean}, {"interval", to_string(interval)},
@@ -245,6 +262,9 @@ void Api::worst(const Request& request, const Done& done) {
 void Api::difference(const Request& request, const Done& done) {
     const auto snapshot = shown(request.query("run").value_or("0"));
     const std::string against = request.query("against").value_or("0");
+    const auto opened = opened_.of_view(against);
+    if (DenoisedImages::run_of(against) || (opened && opened->is_denoised))
+        throw ApiError(422, "a denoised image is biased, so nothing is measured against it");
     std::shared_ptr<const Snapshot> other;
     if (against != "reference")
         other = shown(against);
