@@ -273,6 +273,10 @@ Renderer::Renderer(const Scene& scene, const RenderSettings& settings,
       film_(fitting_film(scene, settings, *integrator_, light_paths_), scene.filter(),
             typical_radiance(scene), settings.filter_mode),
       workers_(std::make_unique<Workers>(settings.threads)) {
+    // Others can be traced again without, or not at all.
+    if (integrator_->error_groups() > 0 || !integrator_->keeps_paths() ||
+        integrator_->samples_alone())
+        settings_.keeps_generations = false;
     check_limits(settings, settings.first_pass);
     check_ranks(settings, *integrator_);
     film_.set_ranks(*settings.ranks);
@@ -318,8 +322,8 @@ bool Renderer::sample_again(uint64_t index, Workspace& work, ContributionSink& s
     work.sums = integrator_->make_sums();
     Sampler sampler(settings_.sampler, place.seed);
     sampler.start(place.pass, index);
-    const SampleContext c{scene_,       film_,       film_.expected(), index, index / kChunk,
-                          light_paths_, splat_scale, sampler,          sink};
+    const SampleContext c{scene_,       film_,       expected(), index, index / kChunk,
+                          light_paths_, splat_scale, sampler,    sink};
     integrator_->trace_eye_paths({&c, 1}, {&work.z, 1}, work.stats);
     integrator_->sample(c, work);
     return true;
@@ -361,13 +365,17 @@ public:
         r_.workers_->take_stats();
         r_.workers_->drop_sums();
     }
-    void trace() {
+    /// What the samples share.
+    void trace_shared() {
         r_.film_.begin_pass(r_.light_paths_,
                             film_offset(r_.settings_.sampler, numbers_.seed,
                                         r_.integrator_->eye_paths_of(numbers_.pass)),
                             hash_combine(numbers_.seed, numbers_.pass));
         r_.integrator_->trace(context());
         r_.kept_pass_ = passes_;
+    }
+    void trace() {
+        trace_shared();
         const std::function<void()>& meanwhile = r_.settings_.meanwhile;
         const uint64_t count = r_.film_.sample_count(), in_turn = walks_in_turn(r_.scene_);
         parallel_for(chunks(count), [&](uint64_t chunk) {
@@ -397,9 +405,8 @@ private:
 
     SampleContext sample_context(uint64_t index, uint64_t chunk, Sampler& sampler,
                                  ContributionSink& sink) const {
-        return {r_.scene_,    r_.film_, r_.film_.expected(),
-                index,        chunk,    r_.light_paths_,
-                splat_scale_, sampler,  sink};
+        return {r_.scene_,       r_.film_,     r_.expected(), index, chunk,
+                r_.light_paths_, splat_scale_, sampler,       sink};
     }
 
     /// Makes samples of a chunk, whose eye paths are traced in turns.
@@ -542,7 +549,13 @@ void Renderer::trace_own_pass(Round& round, const std::atomic<bool>& drop) {
     if (!is_prepared_) Pass(*this, passes, drop).prepare();
     is_prepared_ = true;
     if (rank >= round.passes) return;
+    const uint32_t generation = LearningStep::of(passes).number;
+    const bool is_kept = !generations_.empty() && generations_.back()->number == generation;
+    // Integrators change what they learn from while they make passes.
+    std::vector<std::byte> learned;
+    if (settings_.keeps_generations && !is_kept) learned = learned_state();
     Pass(*this, passes + uint32_t(rank), drop).trace();
+    if (settings_.keeps_generations && !is_kept) keep_generation(generation, std::move(learned));
     if (settings_.ranks->count() == 1) {
         // From the end of the film's pass to that of add_pass(), nothing may fail, so that all of them have the same passes.
         round.sums = workers_->take_sums();
@@ -642,6 +655,33 @@ void Renderer::add_pass(Round& round, int rank) {
     stats_.rejected += rejected;
     integrator_->collect(sums);
     last_rank_ = rank;
+}
+
+void Renderer::keep_generation(uint32_t number, std::vector<std::byte> learned) {
+    generations_.push_back(std::make_shared<const Generation>(
+        Generation{number, std::move(learned), film_.expected()}));
+    const auto bytes = [&] {
+        size_t sum = 0;
+        for (const auto& g : generations_)
+            sum += g->learned.size() + film_.geometry().pixel_count() * sizeof(float);
+        return sum;
+    };
+    while (generations_.size() > 1 && bytes() > kGenerationBytes)
+        generations_.erase(generations_.begin());
+}
+
+std::shared_ptr<const Generation> Renderer::generation_of(uint32_t pass) const {
+    if (pass >= film_.passes() && pass != kept_pass_) return nullptr;
+    for (const auto& g : generations_)
+        if (g->number == LearningStep::of(pass).number) return g;
+    return nullptr;
+}
+
+void Renderer::trace_again(uint32_t pass, std::shared_ptr<const Generation> generation,
+                           const std::atomic<bool>& drop) {
+    load_learned_state(generation->learned);
+    replayed_ = std::move(generation);
+    workers_->arena.execute([&] { Pass(*this, pass, drop).trace_shared(); });
 }
 
 void Renderer::gather() {

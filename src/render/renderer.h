@@ -55,11 +55,22 @@ struct RenderSettings : RenderOptions {
     std::function<void()> meanwhile;
     /// Whether the film notes the brightest pass of every pixel, see Film::largest(). Passes of chains are not noted.
     bool keeps_largest = false;
+    /// Whether what was learned is kept for integrators of which only whole passes can be traced again, see generation_of().
+    /// At most kGenerationBytes are; what was learned first is given up first.
+    bool keeps_generations = false;
     /// The processes that render the image together, each of them by a Renderer with these settings. They must outlive it.
     const Ranks* ranks = &kAlone;
 };
 
 class Renderer;
+
+/// What the passes of a generation (Integrator::learn()) are made from, beside the scene and their random numbers.
+struct Generation {
+    uint32_t number = 0;
+    std::vector<std::byte> learned;
+    ExpectedLuminance expected;
+};
+constexpr size_t kGenerationBytes = size_t(256) << 20;
 
 struct Progress {
     const Renderer& renderer;
@@ -131,6 +142,14 @@ public:
     /// to `work`. May be called where kept_pass() may. Returns false if there is no such pass.
     bool sample_again(uint64_t index, Workspace& work, ContributionSink& sink) const;
 
+    /// What a pass that was made, or is in flight, was made from; nullptr if that is not kept. May be called where kept_pass()
+    /// may.
+    std::shared_ptr<const Generation> generation_of(uint32_t pass) const;
+    /// Traces what the samples of a pass of another renderer share, which has the same scene and settings; then the pass is
+    /// kept_pass(). Needs a renderer without passes, which cannot make any afterwards. Throws PassDropped if `drop` is set.
+    void trace_again(uint32_t pass, std::shared_ptr<const Generation> generation,
+                     const std::atomic<bool>& drop);
+
     /// With several processes: makes the film and the learned state of this one complete. To be called by all of them after
     /// run(), or where Progress::ends_round is true, before the image is read or the state is saved.
     void gather();
@@ -181,6 +200,10 @@ private:
     void drop_pass();
     void exchange(Round& round);
     void add_pass(Round& round, int rank);
+    void keep_generation(uint32_t number, std::vector<std::byte> learned);
+    const ExpectedLuminance& expected() const {
+        return replayed_ ? replayed_->expected : film_.expected();
+    }
     std::vector<std::byte> learned_state() const;
     void load_learned_state(std::vector<std::byte> bytes);
     /// `error`: empty if there is no limit of the error.
@@ -202,6 +225,8 @@ private:
     uint64_t learned_steps_ = 0;  ///< Number of calls of Integrator::learn().
     bool is_prepared_ = false;    ///< Whether Integrator::prepare() has followed the last of them.
     std::optional<uint32_t> kept_pass_;
+    std::vector<std::shared_ptr<const Generation>> generations_;
+    std::shared_ptr<const Generation> replayed_;  ///< Of trace_again().
     int last_rank_ = -1;  ///< The process whose state is that after the last pass; -1: of each.
     bool ended_together_ = true, pass_failed_ = false;  ///< In the last run().
     RenderStats stats_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <mutex>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -89,6 +90,32 @@ private:
     float splat_share_ = 0, h_ = 0;
 };
 
+/// Keeps the splats of one pixel.
+class SplatRecorder final : public ContributionObserver {
+public:
+    SplatRecorder(uint32_t pass, uint64_t pixel, size_t most, Replay& result)
+        : pass_(pass), pixel_(pixel), most_(most), result_(result) {}
+    /// Before any contribution.
+    void set_film(const Film& film) { film_ = &film; }
+
+    void observe(const Join& join, Rgb contribution, float share, const FilmTarget&,
+                 const Workspace& work) override {
+        if (join.technique.t > 1) return;
+        const std::lock_guard lock(mutex_);
+        PathRecorder one(*film_, pixel_, most_, work, result_);
+        one.begin(pass_, true, share, 0);
+        one.add(join, contribution);
+    }
+
+private:
+    uint32_t pass_;
+    uint64_t pixel_;
+    size_t most_;
+    Replay& result_;
+    const Film* film_ = nullptr;
+    std::mutex mutex_;
+};
+
 bool has_roulette_of_joins(const IntegratorSpec& spec) {
     if (spec.make) return false;
     const std::vector<ParamInfo>& params = integrator_entry(spec.name).info.params;
@@ -113,7 +140,7 @@ void sort_by_luminance(Replay& replay) {
 ReplayedPasses replayed_passes(const IntegratorSpec& spec) {
     const std::unique_ptr<Integrator> integrator = make_integrator(spec);
     if (integrator->error_groups() > 0 || !integrator->keeps_paths()) return ReplayedPasses::None;
-    return integrator->samples_alone() ? ReplayedPasses::Any : ReplayedPasses::Last;
+    return integrator->samples_alone() ? ReplayedPasses::Any : ReplayedPasses::Whole;
 }
 
 Replay replay(const Scene& scene, const ReplayRequest& request) {
@@ -187,6 +214,31 @@ Replay replay_last(const Renderer& renderer, uint64_t pixel, size_t most_paths) 
     });
     result.passes = 1;
     sort_by_luminance(result);
+    return result;
+}
+
+Replay replay_pass(const PassOfRun& of, uint64_t pixel, size_t most_paths,
+                   const std::atomic<bool>& drop) {
+    RenderSettings settings = of.settings;
+    settings.technique_depth = 0;
+    settings.meanwhile = nullptr;
+    settings.keeps_largest = settings.keeps_generations = false;
+    Replay splats;
+    SplatRecorder recorder(of.pass, pixel, most_paths, splats);
+    settings.observer = &recorder;
+    Renderer renderer(*of.scene, settings, make_integrator(settings.integrator));
+    recorder.set_film(renderer.film());
+    check_pixel(renderer.film().geometry(), pixel);
+    renderer.trace_again(of.pass, of.generation, drop);
+    Replay result = replay_last(renderer, pixel, most_paths);
+    result.light_paths = renderer.light_paths();
+    result.left_out += splats.left_out;
+    result.paths.insert(result.paths.end(), splats.paths.begin(), splats.paths.end());
+    sort_by_luminance(result);
+    if (result.paths.size() > most_paths) {
+        result.left_out += result.paths.size() - most_paths;
+        result.paths.resize(most_paths);
+    }
     return result;
 }
 

@@ -3,6 +3,8 @@
 // rendering. What pixels share, such as light paths, is not traced again: a method that shares data has those of one pass,
 // the last one or that in flight.
 
+#include <atomic>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -48,13 +50,24 @@ struct Replay {
 /// Which passes of an integrator can be traced again.
 enum class ReplayedPasses {
     Any,
-    Last,  ///< Pixels share data, or paths depend on what was learned: see replay_last().
+    Whole,  ///< As a whole, since pixels share data, or paths depend on what was learned: see replay_pass().
     None,  ///< Paths are states of Markov chains, or are not kept.
 };
 ReplayedPasses replayed_passes(const IntegratorSpec& integrator);
 /// Joins pass no Russian roulette before shadow rays. The sum therefore agrees with the image on average, and exactly if
 /// the image was rendered with roulette=0. Throws std::runtime_error unless any pass can be traced again.
 Replay replay(const Scene& scene, const ReplayRequest& request);
+/// A pass of a run of which only passes as a whole can be traced again.
+struct PassOfRun {
+    std::shared_ptr<const Scene> scene;
+    RenderSettings settings;
+    uint32_t pass = 0;
+    std::shared_ptr<const Generation> generation;
+};
+/// What replay_last() would be after this pass, and the splats. Takes the time of what the samples of a pass share, such as its
+/// light paths, and the memory of a film. Throws PassDropped if `drop` is set.
+Replay replay_pass(const PassOfRun& of, uint64_t pixel, size_t most_paths,
+                   const std::atomic<bool>& drop);
 /// Contributions with t ≥ 2 in Renderer::kept_pass(), with Russian roulette before shadow rays. May be called where that
 /// may. Throws std::runtime_error if there is no such pass.
 Replay replay_last(const Renderer& renderer, uint64_t pixel, size_t most_paths);

@@ -232,7 +232,7 @@ void Session::answer_questions() noexcept {
 
 RenderSettings Session::settings_of_run(RenderSettings settings, int seeds) {
     settings.meanwhile = [this] { answer_questions(); };
-    settings.keeps_largest = seeds == 1;
+    settings.keeps_largest = settings.keeps_generations = seeds == 1;
     return settings;
 }
 
@@ -732,6 +732,18 @@ void Session::replay_last(int id, uint64_t pixel, size_t most_paths,
             replay = etendue::replay_last(*run->renderer, pixel, most_paths);
         });
         done(replay, error);
+    });
+}
+
+void Session::ask_pass(int id, uint32_t pass,
+                       std::function<void(const std::optional<PassOfRun>&)> done) {
+    const std::shared_ptr<Run> run = found(id);
+    ask([run, pass, done = std::move(done)] {
+        if (!run->renderer) return done({});
+        auto generation = run->renderer->generation_of(pass);
+        if (!generation) return done({});
+        done(PassOfRun{std::shared_ptr<const Scene>(run->loaded, &run->loaded->scene),
+                       run->renderer->settings(), pass, std::move(generation)});
     });
 }
 

@@ -195,6 +195,9 @@ public:
     /// those of the last pass or, while its samples are traced, of the pass in flight, whose end is not waited for.
     void replay_last(int run, uint64_t pixel, size_t most_paths,
                      std::function<void(const Replay&, const std::string& error)> done);
+    /// Calls `done` in a thread of the session with what a pass is traced again from; empty if that is not kept.
+    void ask_pass(int run, uint32_t pass,
+                  std::function<void(const std::optional<PassOfRun>&)> done);
     /// Charges processor time, in seconds, that was spent on a snapshot outside the session.
     void spent(double cpu_seconds);
 
@@ -211,8 +214,8 @@ private:
     /// Calls `question`, which changes no run, in a thread of the session, while a pass is traced or between passes.
     void ask(std::function<void()> question);
     void answer_questions() noexcept;
-    /// Settings of a rendering whose threads answer questions and which keeps its largest passes, unless it is one of
-    /// several seeds.
+    /// Settings of a rendering whose threads answer questions and which keeps its largest passes, and what they are traced
+    /// again from, unless it is one of several seeds.
     RenderSettings settings_of_run(RenderSettings settings, int seeds);
     /// Carries out a part of the work of a run. An exception ends the run, which keeps its passes.
     template <class Work>

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <filesystem>
+#include <future>
 
 #include <fmt/format.h>
 
@@ -46,7 +47,6 @@ const std::array<PageFile, 11>& page_files() {
     return files;
 }
 
-std::string hash_of(const std::string& text) {
 /// Toward what the sensor shows above; not normalised.
 Vec3 up_of(const Scene& scene) {
     const auto [width, height] = std::pair{float(scene.film().width), float(scene.film().height)};
@@ -55,6 +55,7 @@ Vec3 up_of(const Scene& scene) {
     return (above.p + above.d) - (below.p + below.d);
 }
 
+std::string hash_of(const std::string& text) {
     return fmt::format("\"{:016x}\"", ContentHash().add(text).value());
 }
 
@@ -65,6 +66,10 @@ Api::Api(Session& session, ApiOptions options)
     const std::filesystem::path folder = std::filesystem::path(options_.scene_file).parent_path();
     scene_folder_ = folder.empty() ? "." : folder.string();
     scene_file_version_ = file_version(options_.scene_file);
+}
+
+Api::~Api() {
+    is_ended_ = true;
 }
 
 // -- Requests.
@@ -203,6 +208,8 @@ Reply Api::state() {
             {"height", g.crop_height},
             {"crop", {g.crop_x, g.crop_y}},
             {"whole", {g.width, g.height}},
+            {"up", to_json(up_of(*scene))},
+            {"filter_is_wide", scene->filter().is_wide()},
             {"sensors", scene->sensor_names()},
             {"sensor", scene->sensor_index()},
             {"has_own_camera", view_.camera.has_value()},
@@ -216,8 +223,6 @@ Reply Api::state() {
             scene->sensor().sample_ray({float(g.width) / 2, float(g.height) / 2}, {0.5f, 0.5f});
         j["scene"]["eye"] = to_json(eye.p);
         j["scene"]["look"] = to_json(eye.d);
-            {"up", to_json(up_of(*scene))},
-            {"filter_is_wide", scene->filter().is_wide()},
     }
     j["runs"] = json::array();
     for (const RunStatus& s : session_.runs()) j["runs"].push_back(to_json(s));
@@ -486,6 +491,37 @@ void Api::probe(const Request& request, const Done& done) {
     replay_pixel(body, done);
 }
 
+void Api::replay_last_pass(int run, uint64_t pixel, size_t most, const Done& done) {
+    session_.replay_last(run, pixel, most, [done](const Replay& paths, const std::string& error) {
+        if (!error.empty()) return done(Reply::error(422, error));
+        json j = to_json(paths);
+        j["is_last_pass"] = true;
+        done(Reply::json(dump(j)));
+    });
+}
+
+template <class Answer>
+Answer Api::answer_of(const std::function<void(std::function<void(const Answer&)>)>& ask) const {
+    using namespace std::chrono_literals;
+    const auto promise = std::make_shared<std::promise<Answer>>();
+    std::future<Answer> answer = promise->get_future();
+    ask([promise](const Answer& a) { promise->set_value(a); });
+    while (answer.wait_for(20ms) != std::future_status::ready)
+        if (is_ended_) throw ApiError(503, "the program ends");
+    return answer.get();
+}
+
+Reply Api::replay_whole_pass(int run, uint32_t pass, uint64_t pixel, size_t most) {
+    const auto of = answer_of<std::optional<PassOfRun>>(
+        [&](auto done) { session_.ask_pass(run, pass, std::move(done)); });
+    if (!of)
+        return answer_of<Reply>(
+            [&](auto done) { replay_last_pass(run, pixel, most, std::move(done)); });
+    json j = to_json(replay_pass(*of, pixel, most, is_ended_));
+    j["pass"] = pass;
+    return Reply::json(dump(j));
+}
+
 void Api::replay_pixel(const json& body, const Done& done) {
     const int run = int(integer(body, "run", 1, INT32_MAX));
     const RunStatus status = session_.status(run);
@@ -507,14 +543,13 @@ void Api::replay_pixel(const json& body, const Done& done) {
         throw ApiError(422, fmt::format("paths of {} cannot be traced again: they are states of "
                                         "Markov chains, or are not kept",
                                         integrator.name));
-    case ReplayedPasses::Last:
-        return session_.replay_last(run, pixel, most,
-                                    [done](const Replay& paths, const std::string& error) {
-                                        if (!error.empty()) return done(Reply::error(422, error));
-                                        json j = to_json(paths);
-                                        j["is_last_pass"] = true;
-                                        done(Reply::json(dump(j)));
-                                    });
+    case ReplayedPasses::Whole:
+        if (!body.contains("pass")) return replay_last_pass(run, pixel, most, done);
+        return later(
+            workers_, done,
+            [this, run, pixel, most, pass = uint32_t(integer(body, "pass", 0, INT32_MAX))] {
+                return replay_whole_pass(run, pass, pixel, most);
+            });
     case ReplayedPasses::Any: break;
     }
     ReplayRequest request;

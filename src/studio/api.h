@@ -49,6 +49,8 @@ struct ApiOptions {
 class Api final : public Handler {
 public:
     Api(Session& session, ApiOptions options);
+    /// Ends the replays that are under way.
+    ~Api() override;
 
     Admission admit(const Request& request) override;
     void handle(Request request, std::function<void(Reply)> done) override;
@@ -80,6 +82,13 @@ private:
     Reply get_paths(const Request& request);
     Reply put_paths(const Request& request);
     void probe(const Request& request, const Done& done);
+    /// Of a method of which only whole passes can be traced again.
+    void replay_last_pass(int run, uint64_t pixel, size_t most, const Done& done);
+    /// The paths of the pass or, if it is not kept what it is made from, of the last one; of a worker.
+    Reply replay_whole_pass(int run, uint32_t pass, uint64_t pixel, size_t most);
+    /// What the session answers; of a worker.
+    template <class Answer>
+    Answer answer_of(const std::function<void(std::function<void(const Answer&)>)>& ask) const;
     void replay_pixel(const nlohmann::json& body, const Done& done);
     /// Calls `task`, which may throw, in a worker.
     static void later(Workers& workers, const Done& done, std::function<Reply()> task);
@@ -105,12 +114,13 @@ private:
     std::string scene_file_version_;  ///< As it was loaded.
     bool is_scene_changed_ = false;
     uint64_t own_revision_ = 0;
+    std::atomic<bool> is_ended_{false};
 
     std::mutex data_mutex_;
     std::shared_ptr<SceneData> data_;
     // The last members: their tasks end before the others are destroyed. Images do not wait for longer tasks.
     Workers workers_{2}, image_workers_{1};
+    DenoisedImages denoised_;
 };
 
 }  // namespace etendue
-    DenoisedImages denoised_;

@@ -2,6 +2,9 @@
 
 #include "session/replay.h"
 
+#include <algorithm>
+#include <map>
+
 #include <gtest/gtest.h>
 
 #include "render/renderer.h"
@@ -125,7 +128,7 @@ TEST(Replay, AsksTheIntegrator) {
                                   return std::make_unique<OwnIntegrator>(alone);
                               }};
         EXPECT_EQ(replayed_passes(request.integrator),
-                  alone ? ReplayedPasses::Any : ReplayedPasses::Last);
+                  alone ? ReplayedPasses::Any : ReplayedPasses::Whole);
         if (alone)
             EXPECT_EQ(replay(scene, request).sum, expected.sum);
         else
@@ -198,10 +201,55 @@ TEST(Replay, KnowsWhichPassesCanBeTraced) {
     for (const char* alone : {"path", "bdpt:roulette=0", "light", "path:guide=off"})
         EXPECT_EQ(passes(alone), ReplayedPasses::Any) << alone;
     for (const char* shared : {"vcm", "upg", "pcbpt", "path:guide=on"})
-        EXPECT_EQ(passes(shared), ReplayedPasses::Last) << shared;
+        EXPECT_EQ(passes(shared), ReplayedPasses::Whole) << shared;
     for (const char* none : {"mlt", "pssmlt", "pm"})
         EXPECT_EQ(passes(none), ReplayedPasses::None) << none;
 }
+
+class ReplayOfPass : public ::testing::TestWithParam<const char*> {};
+
+/// Any pass is traced again as it was when it was the last one, whatever was learned since.
+TEST_P(ReplayOfPass, IsThatAfterThePass) {
+    const Scene scene = room_with_ball();
+    RenderSettings settings = settings_of(GetParam());
+    settings.keeps_generations = true;
+    Renderer renderer(scene, settings);
+    const auto shared = std::shared_ptr<const Scene>(std::shared_ptr<void>(), &scene);
+    std::map<uint32_t, std::vector<Replay>> before;
+    const uint64_t pixels = scene.film().pixel_count();
+    for (const uint32_t pass : {0u, 2u, 5u, 19u}) {
+        RenderLimits limits;
+        limits.spp = pass + 1;
+        renderer.run(
+            limits, [](const Progress&) {}, std::atomic<bool>(false));
+        for (uint64_t p = 0; p < pixels; p += 7)
+            before[pass].push_back(replay_last(renderer, p, 100000));
+    }
+    EXPECT_FALSE(renderer.generation_of(20));
+    size_t paths = 0;
+    for (const auto& [pass, replays] : before) {
+        const PassOfRun of{shared, renderer.settings(), pass, renderer.generation_of(pass)};
+        ASSERT_TRUE(of.generation);
+        for (uint64_t p = 0, i = 0; p < pixels; p += 7, ++i) {
+            const Replay again = replay_pass(of, p, 100000, std::atomic<bool>(false));
+            EXPECT_EQ(again.sum, replays[i].sum) << "pass " << pass << ", pixel " << p;
+            EXPECT_EQ(size_t(std::count_if(again.paths.begin(), again.paths.end(),
+                                           [](const auto& q) { return q.technique.t >= 2; })),
+                      replays[i].paths.size());
+            for (const ReplayedPath& path : again.paths) EXPECT_EQ(path.pass, pass);
+            paths += again.paths.size();
+        }
+    }
+    EXPECT_GT(paths, 20u);
+    EXPECT_THROW(replay_pass({shared, renderer.settings(), 2, renderer.generation_of(2)}, 0, 1,
+                             std::atomic<bool>(true)),
+                 PassDropped);
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, ReplayOfPass,
+                         ::testing::Values("vcm", "vcm:guide=on", "upg", "upg+bdpt", "pcbpt",
+                                           "sppm", "path:guide=on", "bdpt:guide=on",
+                                           "path:specular_connections=auto"));
 
 class LastReplayOf : public ::testing::TestWithParam<const char*> {};
 

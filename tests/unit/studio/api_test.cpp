@@ -274,6 +274,35 @@ TEST_F(ApiTest, NamesThePassThatMadeAPixelBright) {
     EXPECT_TRUE(json::parse(get("/v1/worst?run=" + std::to_string(chains)).body)["pixels"].empty());
 }
 
+/// Also of methods that share light paths, or learn.
+TEST_F(ApiTest, TracesThePassThatMadeAPixelBright) {
+    open();
+    for (const char* method : {"upg", "pcbpt", "path:guide=on", "vcm", "bdpt:guide=on", "sppm"}) {
+        const int run = finished_run({{"integrator", method}, {"spp", 20}});
+        const json worst =
+            json::parse(get("/v1/worst?count=3&run=" + std::to_string(run)).body)["pixels"];
+        ASSERT_EQ(worst.size(), 3u) << method;
+        for (const json& w : worst) {
+            const json replayed = json::parse(post("/v1/replay", {{"run", run},
+                                                                  {"x", w["x"]},
+                                                                  {"y", w["y"]},
+                                                                  {"pass", w["pass"]},
+                                                                  {"most", 10000}})
+                                                  .body);
+            EXPECT_EQ(replayed["pass"], w["pass"]) << method;
+            ASSERT_FALSE(replayed.contains("is_last_pass")) << method;
+            float sum = 0;
+            for (const json& path : replayed["paths"]) {
+                const json& v = path["value"];
+                sum += luminance(Rgb(v[0].get<float>(), v[1].get<float>(), v[2].get<float>()));
+            }
+            EXPECT_NEAR(sum, w["value"].get<float>(), 2e-3f * w["value"].get<float>()) << method;
+        }
+        const json last = json::parse(post("/v1/replay", {{"run", run}, {"x", 3}, {"y", 4}}).body);
+        EXPECT_EQ(last["is_last_pass"], true) << method;
+    }
+}
+
 TEST_F(ApiTest, ChangesWhatIsRendered) {
     SceneView view;
     ApiOptions options;
