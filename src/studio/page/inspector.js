@@ -23,6 +23,8 @@ export class Inspector {
         /** Run of the paths; 0: there are none. */
         this.of = 0;
         this.request = 0;
+        /** Whether the paths are all of a pass that was traced as a whole. */
+        this.isWhole = false;
         this.place = element('span', {className: 'soft'});
         this.passes = element('input', {id: 'replay-passes', type: 'number', min: 1, value: 16});
         this.splats = element('input', {id: 'replay-splats', type: 'checkbox'});
@@ -60,7 +62,7 @@ export class Inspector {
         this.splats.checked = false;
         if (!await this.replay(pass)) return;
         const luminance = (/** @type {number[]} */ v) => 0.2126 * v[0] + 0.7152 * v[1] + 0.0722 * v[2];
-        if (this.of > 0 && this.message.className === '' && luminance(this.sum) < 0.5 * value) {
+        if (this.of > 0 && !this.isWhole && this.message.className === '' && luminance(this.sum) < 0.5 * value) {
             this.splats.checked = true;
             if (!await this.replay(pass)) return;
         }
@@ -80,12 +82,14 @@ export class Inspector {
         // Methods that share light paths answer between two passes.
         this.message.textContent = 'tracing, or waiting for the end of the pass …';
         try {
-            const r = await this.server.post('/v1/replay', {x, y, run, pass: pass ?? 0, passes: pass === undefined ? Number(this.passes.value) : 1, splats: this.splats.checked});
+            const what = pass === undefined ? {passes: Number(this.passes.value)} : {pass, passes: 1};
+            const r = await this.server.post('/v1/replay', {x, y, run, ...what, splats: this.splats.checked});
             if (request !== this.request) return false;
             this.paths = r.paths;
             this.sum = r.sum;
             const sum = r.sum.map((/** @type {number} */ v) => significant(v / Math.max(1, r.passes), 4)).join(', ');
-            this.message.textContent = `pixel (${x}, ${y}): ${r.paths.length} paths of ${r.is_last_pass ? 'the last pass' : pass !== undefined ? `pass ${pass}` : `${r.passes} passes`}${r.left_out ? `, ${r.left_out} left out` : ''}; mean without splats (${sum})`
+            this.isWhole = 'pass' in r || Boolean(r.is_last_pass);
+            this.message.textContent = `pixel (${x}, ${y}): ${r.paths.length} paths of ${r.is_last_pass ? `the last pass${pass === undefined ? '' : `, since nothing is kept from which pass ${pass} could be traced again`}` : pass !== undefined ? `pass ${pass}` : `${r.passes} passes`}${r.left_out ? `, ${r.left_out} left out` : ''}; mean without splats (${sum})`
                 + (r.light_paths ? `; ${r.light_paths} light paths` : '');
         } catch (e) {
             if (request !== this.request) return false;

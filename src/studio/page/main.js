@@ -69,10 +69,16 @@ function report(promise) {
 
 // ---------------------------------------------------------------------------------------- image
 
-const view = new View(at('view'), {pixel: () => showPixel(), wipe: w => { tools.wipe.value = w; }});
+const view = new View(at('view'), {pixel: () => showPixel(), trace: () => { traceBrightest(); }, wipe: w => { tools.wipe.value = w; }});
 if (!view.hasGraphics) banner('graphics', 'This browser has no WebGL2: only numbers are shown.');
 
-const kLabels = {image: '', error: 'relative standard error', first: 'first picture: albedo × cosine, no light yet'};
+const kLabels = {image: '', error: 'relative standard error', denoised: 'denoised, not unbiased', first: 'first picture: albedo × cosine, no light yet'};
+
+/**
+ * The choice of views has no denoised image; the switch shows it in the place of the image.
+ * @param {Shown} s
+ */
+const chosenView = s => s.view === 'denoised' ? 'image' : s.view;
 
 /**
  * Requests a newer picture of one place. One request is under way at a time; a call in the meantime is made up for at its end.
@@ -82,7 +88,7 @@ async function refresh(place) {
     const s = shown[place];
     if (s?.busy) s.again = true;
     if (!s || s.busy || s.isRefused || document.hidden || !view.hasGraphics || !state?.scene) return;
-    const isOfRun = s.run > 0 && (['image', 'error', 'variance'].includes(s.view) || s.view.includes(':'));
+    const isOfRun = s.run > 0 && (['image', 'denoised', 'error', 'variance'].includes(s.view) || s.view.includes(':'));
     if (!isOfRun && s.passes > 0) return;
     const run = runs.get(s.run);
     if (isOfRun && run && s.isAsked && run.snapshot <= s.passes && !s.view.includes(':')) return;
@@ -103,7 +109,7 @@ async function refresh(place) {
             s.passes = Math.max(1, picture.passes);
             draw(place, picture, textOf(s, picture.passes));
             if ((isOfRun || openedIn(s)) && (place === 0 || isFirst)) showPixel();
-        } else if (s.passes === 0 && place === 0 && s.view === 'image' && !view.pictures[0]) {
+        } else if (s.passes === 0 && place === 0 && chosenView(s) === 'image' && !view.pictures[0]) {
             const first = await server.image({view: 'first'});
             if (first && s.passes === 0 && shown[0] === s) draw(0, first, kLabels.first);
         }
@@ -113,7 +119,11 @@ async function refresh(place) {
             s.isRefused = true;
             draw(place, null, '');
         }
-        if (e instanceof Refusal && e.status !== 503) banner('image', e.message, 'Dismiss', () => banner('image', ''));
+        if (e instanceof Refusal && e.status === 422 && s.view === 'denoised' && shown[place] === s) {
+            banner('denoise', e.message, 'Dismiss', () => banner('denoise', ''));
+            tools.denoise.checked = false;
+            switchDenoising();
+        } else if (e instanceof Refusal && e.status !== 503) banner('image', e.message, 'Dismiss', () => banner('image', ''));
     } finally {
         s.busy = false;
     }
@@ -159,6 +169,7 @@ function label() {
 
 /** @param {0 | 1} place @param {number} run @param {string} what */
 function showIn(place, run, what) {
+    if (place === 0 && run > 0 && what === 'image' && tools.denoise.checked) what = 'denoised';
     if (place === 0 || run > 0 || what === 'reference' || what.startsWith('opened:')) shown[place] = {run, view: what, passes: 0, isAsked: false, busy: false, again: false, isRefused: false};
     else shown[1] = null;
     tools.measured.textContent = '';
@@ -210,6 +221,18 @@ async function traceWorst(run, {x, y, pass, value}) {
     await inspector?.replayPass(pass, value);
 }
 
+/** Traces again what made the selected pixel of the shown run bright, or all of its paths if that is unknown. */
+async function traceBrightest() {
+    const run = shown[0].run, [x, y] = view.cursor;
+    if (!runs.has(run)) return;
+    const {pixel} = await server.get(`/v1/worst?run=${run}&x=${x}&y=${y}`).catch(() => ({pixel: null}));
+    if (pixel) return traceWorst(run, pixel);
+    view.corner = null;
+    showPane('paths');
+    inspector?.setPixel(x, y, run);
+    await inspector?.replay();
+}
+
 const percent = (/** @type {number} */ share) => `${Math.round(100 * share)} %`;
 
 /** Lists the pixels of the shown run that owe most to one pass. */
@@ -234,6 +257,9 @@ async function listWorst() {
  */
 let afterLoad = null;
 
+/** Files are named, not addressed. */
+const kFolders = /user_paths=[^,]*\//;
+
 /**
  * Has the program load the scene with another camera, region or sensor, and render it by the method that is shown.
  * @param {any} change
@@ -242,8 +268,7 @@ async function changeView(change) {
     const run = runs.get(shown[0].run) ?? runs.get(newest());
     await server.post('/v1/run', {action: 'view', ...change});
     afterLoad = async () => {
-        // Files are named, not addressed.
-        const integrator = (run?.integrator ?? '').replace(/user_paths=[^,]*\//, 'user_paths=');
+        const integrator = (run?.integrator ?? '').replace(kFolders, 'user_paths=');
         await begin({action: 'start', integrator, ...(run?.sampler ? {sampler: run.sampler} : {})});
         banner('image', '');
     };
@@ -261,12 +286,50 @@ function whole() {
     return {x: 0, y: 0, w, h};
 }
 
+/** Shows the image of the run with its noise, or without. */
+function switchDenoising() {
+    if (chosenView(shown[0]) === 'image') showIn(0, shown[0].run, 'image');
+    updateDenoising();
+}
+
+/** Says where denoising gains little. */
+function updateDenoising() {
+    const run = runs.get(shown[0].run);
+    tools.spread.hidden = !(tools.denoise.checked && run?.filter_mode === 'spread' && state?.scene?.filter_is_wide);
+}
+
+/** Renders by the method that is shown, so that the errors of pixels are independent. */
+async function startSampling() {
+    const run = runs.get(shown[0].run);
+    if (run) await begin({action: 'start', integrator: run.integrator.replace(kFolders, 'user_paths='), sampler: run.sampler, seed: run.seed, filter_mode: 'sample'});
+}
+
 async function savePicture() {
     const png = await view.png();
     if (!png) return;
-    const link = element('a', {href: URL.createObjectURL(png), download: `${(state?.scene_file ?? 'picture').replace(/\.[^.]*$/, '')}.png`});
+    const ending = shown.some(s => s?.view === 'denoised') ? '.denoised.png' : '.png';
+    const link = element('a', {href: URL.createObjectURL(png), download: (state?.scene_file ?? 'picture').replace(/\.[^.]*$/, '') + ending});
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+}
+
+/** The values of the selected pixel or rectangle, a line for each picture: the place, red, green, blue. */
+let values = '';
+
+async function copyValues() {
+    if (!values) return;
+    try {
+        await navigator.clipboard.writeText(values);
+    } catch {
+        // Pages by the name of another machine have no clipboard.
+        const area = element('textarea', {value: values});
+        document.body.append(area);
+        area.select();
+        document.execCommand('copy');
+        area.remove();
+    }
+    at('spoken').textContent = `copied: ${values}`;
+    at('copied').textContent = 'copied';
 }
 
 let pixelRequest = 0;
@@ -275,15 +338,19 @@ async function showPixel() {
     const request = ++pixelRequest;
     const {x, y, w, h} = view.selected();
     const isPixel = w * h === 1;
+    /** @type {string[]} */
+    const lines = [];
     const parts = [element('div', {textContent: isPixel ? `(${x}, ${y})` : `(${x}, ${y}) to (${x + w - 1}, ${y + h - 1}): ${w} × ${h} pixels`})];
     const describePixel = async (/** @type {Shown | null} */ s) => {
         const opened = openedIn(s);
         if (!s || (s.run === 0 && !opened)) return;
-        const p = await server.get(`/v1/pixel?${opened ? `view=${s.view}` : `run=${s.run}`}&x=${x}&y=${y}&w=${w}&h=${h}`).catch(() => null);
+        const isDenoised = s.view === 'denoised', source = opened ? `view=${s.view}` : isDenoised ? `view=denoised:${s.run}` : `run=${s.run}`;
+        const p = await server.get(`/v1/pixel?${source}&x=${x}&y=${y}&w=${w}&h=${h}`).catch(() => null);
         if (!p?.passes) return;
-        const kNames = {confidence: '± 95 %', upper: '± upper bound (sobol)', 'noise only': '± noise only, without bias', none: opened ? 'no interval' : runs.get(s.run)?.seeds ? 'no interval: several seeds' : 'no interval: one chain'};
+        const kNames = {confidence: '± 95 %', upper: '± upper bound (sobol)', 'noise only': '± noise only, without bias', none: isDenoised ? 'denoised, not unbiased' : opened ? 'no interval' : runs.get(s.run)?.seeds ? 'no interval: several seeds' : 'no interval: one chain'};
         const cells = (/** @type {string} */ scope, /** @type {string} */ name, /** @type {string[]} */ values) => element('tr', {}, [element('th', {scope, textContent: name}),
             ...values.map(textContent => element(scope === 'col' ? 'th' : 'td', {textContent}))]);
+        lines.push([x, y, ...(isPixel ? [] : [w, h]), ...p.mean.map((/** @type {number} */ v) => Number.isFinite(v) ? Number(v.toPrecision(7)) : v)].join(' '));
         const kChannels = ['red', 'green', 'blue'];
         // A pixel has few values; those of a rectangle need a row each.
         const statistics = {mean: p.mean, '±': p.half, least: p.least, largest: p.largest, variance: p.variance, reference: p.reference};
@@ -295,7 +362,10 @@ async function showPixel() {
         if (p.nan + p.infinite > 0) parts.push(element('div', {className: 'error', textContent: `left out: ${p.nan} pixels NaN, ${p.infinite} infinite`}));
     };
     await describePixel(shown[0]);
+    if (shown[0].view === 'denoised' && shown[1]?.run !== shown[0].run) await describePixel({...shown[0], view: 'image'});
     await describePixel(shown[1]);
+    if (lines.length > 0) parts.push(element('div', {className: 'bar'}, [element('button', {type: 'button', id: 'copy-values', textContent: 'Copy', title: 'Copy the place and the mean of each picture (C)', onclick: () => { copyValues(); }}),
+        element('span', {id: 'copied', className: 'soft'})]));
     // The run may have been removed meanwhile.
     const run = shown[0].run;
     if (isPixel && runs.has(run)) {
@@ -304,6 +374,7 @@ async function showPixel() {
             element('button', {type: 'button', id: 'trace-brightest', textContent: 'Trace it', onclick: () => { traceWorst(run, pixel); }})]));
     }
     if (request !== pixelRequest) return;
+    values = lines.join('\n');
     tools.region.disabled = w * h === 1;
     at('pixel').replaceChildren(...parts);
     inspector?.setPixel(view.cursor[0], view.cursor[1], shown[0].run);
@@ -315,8 +386,8 @@ async function measure() {
     if (!b) return;
     tools.measured.textContent = '…';
     try {
-        const key = (/** @type {Shown} */ s) => s.run > 0 ? s.run : s.view;
-        const name = (/** @type {Shown} */ s, /** @type {number} */ passes) => s.view === 'reference' ? 'the reference' : openedIn(s)?.file ?? `run ${s.run}, ${passes} spp`;
+        const key = (/** @type {Shown} */ s) => s.view === 'denoised' ? `denoised:${s.run}` : s.run > 0 ? s.run : s.view;
+        const name = (/** @type {Shown} */ s, /** @type {number} */ passes) => s.view === 'reference' ? 'the reference' : openedIn(s)?.file ?? `run ${s.run}${s.view === 'denoised' ? ' denoised' : ''}, ${passes} spp`;
         const d = await server.get(`/v1/difference?run=${key(a)}&against=${key(b)}`);
         tools.measured.textContent = `relMSE ${significant(d.rel_mse)}, FLIP ${significant(d.flip)}: ${name(a, d.passes)}, against ${name(b, d.against_passes)}`
             + (d.not_finite ? `; ${d.not_finite} pixels that are not finite are left out of relMSE` : '');
@@ -342,6 +413,8 @@ function makeTools() {
     tools.measured = element('output', {});
     tools.tone = element('select', {id: 'tone', onchange: () => { view.tone = Number(tools.tone.value); view.redraw(); }},
         ['sRGB', 'ACES', 'Reinhard'].map((t, i) => element('option', {value: i, textContent: t})));
+    tools.channel = element('select', {id: 'channel', onchange: () => { view.channel = Number(tools.channel.value); view.redraw(); }},
+        ['all', 'red', 'green', 'blue', 'luminance'].map((t, i) => element('option', {value: i, textContent: t})));
     tools.auto = element('button', {type: 'button', id: 'auto-exposure', textContent: 'Auto', title: 'The exposure that fits the image', onclick: () => { if (histogram) setExposure(exposureFor(histogram)); }});
     tools.region = element('button', {type: 'button', id: 'render-region', textContent: 'Render region', title: 'Render the selected rectangle alone', disabled: true, onclick: renderRegion});
     tools.whole = element('button', {type: 'button', id: 'render-whole', textContent: 'Render all', title: 'Render the whole image again', hidden: true, onclick: () => report(changeView({crop: whole()}))});
@@ -351,8 +424,11 @@ function makeTools() {
     tools.worstText = element('p', {className: 'soft'});
     tools.worstList = element('div', {className: 'replayed', role: 'group', 'aria-label': 'Pixels by what one pass made of them'});
     at('worst').append(element('button', {type: 'button', id: 'find-worst', textContent: 'Find', onclick: () => { listWorst(); }}), tools.worstText, tools.worstList);
+    tools.denoise = element('input', {type: 'checkbox', id: 'denoise', onchange: switchDenoising});
+    tools.spread = element('span', {id: 'denoise-spread', className: 'note', hidden: true}, ['filter mode spread: pixels share errors, so denoising gains less ',
+        element('button', {type: 'button', id: 'start-sampling', textContent: 'Start with filter mode sample', title: 'A new run of this method, whose samples contribute to one pixel each', onclick: () => report(startSampling())})]);
     const field = (/** @type {string} */ text, /** @type {any} */ input, /** @type {any[]} */ ...more) => element('label', {}, [`${text} `, input, ...more]);
-    at('view-tools').append(field('show', tools.view), field('exposure', tools.exposure, ' ', tools.exposureText), tools.auto, field('as', tools.mode), field('tone', tools.tone),
+    at('view-tools').append(field('show', tools.view), element('label', {title: 'Show the image of the run without its noise: biased, and not what is saved'}, [tools.denoise, ' denoise']), tools.spread, field('exposure', tools.exposure, ' ', tools.exposureText), tools.auto, field('as', tools.mode), field('channels', tools.channel), field('tone', tools.tone),
         field('compare with', tools.against), field('wipe', tools.wipe),
         element('button', {type: 'button', textContent: 'Flip', onclick: flip}), element('button', {type: 'button', textContent: 'Whole image', onclick: () => view.resetZoom()}),
         tools.measure, element('button', {type: 'button', id: 'save-picture', textContent: 'Save picture', title: 'The picture as it is shown, as a PNG file', onclick: () => { savePicture(); }}),
@@ -414,8 +490,8 @@ async function updateViewOptions() {
     const opened = openedIn(shown[0]);
     if (opened) options.push([shown[0].view, opened.file]);
     setOptions(tools.view, options, 'image');
-    if (!options.some(([value]) => value === shown[0].view)) showIn(0, shown[0].run, 'image');
-    tools.view.value = shown[0].view;
+    if (!options.some(([value]) => value === chosenView(shown[0]))) showIn(0, shown[0].run, 'image');
+    tools.view.value = chosenView(shown[0]);
 }
 
 // ---------------------------------------------------------------------------------------- runs
@@ -460,6 +536,7 @@ function updateRuns() {
     if (state?.has_reference) others.push(['reference', 'reference']);
     for (const i of state?.images ?? []) others.push([viewOf(i.id), i.file]);
     images.update(state?.images ?? [], state?.scene);
+    updateDenoising();
     setOptions(tools.against, others, '0');
     if (pane === 'image') drawPlot(at('plot'), all);
 }
@@ -647,6 +724,8 @@ document.addEventListener('keydown', e => {
         const run = runs.get(shown[0].run);
         if (run) act(run.state === 'rendering' ? 'stop' : 'continue', run.id);
     } else if (e.key === 'f') flip();
+    else if (e.key === 'c' && pane === 'image') copyValues();
+    else if (e.key === 'd' && pane === 'image') tools.denoise.click();
     else if (e.key === '+' || e.key === '=') setExposure(view.exposure + 0.5);
     else if (e.key === '-') setExposure(view.exposure - 0.5);
     else if (e.key === '?') help.showModal();

@@ -342,6 +342,7 @@ export class PathEditor {
         else if (e.key === 't') this.run(() => this.trace());
         else if (e.key === 'm') this.run(() => this.solve());
         else if (e.key === 'v') this.lookFromPoint();
+        else if (e.key === 'g') this.space.walk(!this.space.isWalking);
         else if (document.activeElement !== this.space.canvas) return false;
         else return this.onCanvasKey(e);
         return true;

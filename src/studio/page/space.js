@@ -2,7 +2,7 @@
 // The scene in three dimensions, with light paths. Rays are traced by the program, on the true geometry.
 
 import {clamp, fit, makeProgram} from './view.js';
-import {element} from './controls.js';
+import {element, significant} from './controls.js';
 
 /** @typedef {[number, number, number]} Vec */
 
@@ -77,8 +77,25 @@ export function coneOutline(apex, toward, degrees) {
     return [rim, ...[0, 1, 2, 3].map(i => [apex, rim[i * kCorners / 4]])];
 }
 
+/**
+ * The axis of the scene that is closest to the upward direction of the camera.
+ * @param {Vec} up
+ */
+function upAxis(up) {
+    const i = [0, 1, 2].reduce((best, c) => Math.abs(up[c]) > Math.abs(up[best]) ? c : best, 1);
+    return {index: i, sign: up[i] < 0 ? -1 : 1};
+}
+
 /** @param {any} scene */
-const cameraOf = scene => ({eye: /** @type {Vec} */ (scene.eye), look: /** @type {Vec} */ (scene.look), center: /** @type {Vec} */ (scene.center)});
+const cameraOf = scene => ({eye: /** @type {Vec} */ (scene.eye), look: /** @type {Vec} */ (scene.look), center: /** @type {Vec} */ (scene.center), up: upAxis(scene.up)});
+
+/**
+ * Keys of walking, by their places on the keyboard, and the directions: to the right, up, forward.
+ * @type {Record<string, Vec>}
+ */
+const kSteps = {KeyW: [0, 0, 1], KeyS: [0, 0, -1], KeyA: [-1, 0, 0], KeyD: [1, 0, 0], KeyE: [0, 1, 0], KeyR: [0, 1, 0], KeyQ: [0, -1, 0], KeyF: [0, -1, 0]};
+/** Radii of the scene in a second, at first. */
+const kWalkingSpeed = 0.4;
 
 /**
  * A line through points, drawn as one color.
@@ -96,6 +113,18 @@ export class Space {
         this.server = server;
         this.radius = scene.radius;
         this.home = cameraOf(scene);
+        /** What the view turns about. @type {Vec} */
+        this.target = this.home.center;
+        /** Of the target from the eye. @type {number} */
+        this.distance = scene.radius;
+        /** Whether the view walks: it turns about the eye, and keys move it. */
+        this.isWalking = false;
+        /** Radii of the scene in a second. */
+        this.speed = kWalkingSpeed;
+        /** Keys of walking that are pressed. @type {Set<string>} */
+        this.pressed = new Set();
+        this.runs = false;
+        this.lastStep = 0;
         /** The crosshair, from -1 to 1. */
         this.cross = [0, 0];
         this.cut = 0;
@@ -118,10 +147,13 @@ export class Space {
          */
         this.tell = {click: () => {}, drag: () => false, press: () => false, release: () => {}, render: () => {}};
         this.cutInput = element('input', {type: 'range', id: 'cut', min: 0, max: 1, step: 0.005, value: 0, oninput: () => { this.cut = Number(this.cutInput.value); this.redraw(); }});
+        this.walkButton = element('button', {type: 'button', id: 'walk', textContent: 'Walk', 'aria-pressed': 'false',
+            title: 'Drag to look around; W A S D to go, E and Q or R and F to rise and sink, with Shift faster; the wheel changes the speed', onclick: () => { this.walk(!this.isWalking); canvas.focus(); }});
         toolbar.append(
+            this.walkButton,
             element('button', {type: 'button', textContent: 'Camera', title: 'Look as the camera does', onclick: () => this.lookAsCamera()}),
             element('button', {type: 'button', textContent: 'From outside', title: 'Look from outside the scene', onclick: () => this.lookFromOutside()}),
-            element('button', {type: 'button', id: 'render-view', textContent: 'Render this view', title: 'Put the camera of the scene here, and render', onclick: () => this.tell.render({eye: this.eye(), target: add(this.eye(), this.forward(), this.radius), up: [0, 1, 0]})}),
+            element('button', {type: 'button', id: 'render-view', textContent: 'Render this view', title: 'Put the camera of the scene here, and render', onclick: () => this.tell.render({eye: this.eye(), target: add(this.eye(), this.forward(), this.radius), up: this.vertical()})}),
             element('label', {title: 'Leave out what is nearer than this'}, ['cut away ', this.cutInput]));
         this.lookAsCamera();
         const gl = canvas.getContext('webgl2', {antialias: true, preserveDrawingBuffer: true});
@@ -162,27 +194,40 @@ export class Space {
         this.cutInput.value = 0;
         this.setDirection(unit(add(this.home.center, point, -1)));
     }
+    vertical() {
+        const {index, sign} = this.home.up;
+        return /** @type {Vec} */ ([0, 1, 2].map(c => c === index ? sign : 0));
+    }
+    /** Indices of the horizontal axes, such that x, the vertical and z are a right-handed frame. */
+    horizontal() {
+        const {index, sign} = this.home.up, x = (index + 2) % 3, z = (index + 1) % 3;
+        return sign > 0 ? [x, z] : [z, x];
+    }
     /** @param {Vec} d */
     setDirection(d) {
-        this.azimuth = Math.atan2(d[0], d[2]);
-        this.height = Math.asin(clamp(d[1], -1, 1));
+        const [x, z] = this.horizontal();
+        this.azimuth = Math.atan2(d[x], d[z]);
+        this.height = Math.asin(clamp(dot(d, this.vertical()), -1, 1));
         this.redraw();
     }
     forward() {
-        const c = Math.cos(this.height ?? 0), a = this.azimuth ?? 0;
-        return /** @type {Vec} */ ([c * Math.sin(a), Math.sin(this.height ?? 0), c * Math.cos(a)]);
+        const c = Math.cos(this.height ?? 0), a = this.azimuth ?? 0, [x, z] = this.horizontal();
+        const d = /** @type {Vec} */ (this.vertical().map(v => v * Math.sin(this.height ?? 0)));
+        d[x] = c * Math.sin(a);
+        d[z] = c * Math.cos(a);
+        return d;
     }
     frame() {
-        const forward = this.forward(), right = unit(cross(forward, [0, 1, 0]));
+        const forward = this.forward(), right = unit(cross(forward, this.vertical()));
         return {forward, right, up: cross(right, forward)};
     }
-    eye() { return add(/** @type {Vec} */ (this.target), this.forward(), -/** @type {number} */ (this.distance)); }
-    near() { return 2e-3 * this.radius + this.cut * 2 * (/** @type {number} */ (this.distance) + this.radius); }
+    eye() { return add(this.target, this.forward(), -this.distance); }
+    near() { return 2e-3 * this.radius + this.cut * 2 * (this.distance + this.radius); }
 
     matrix() {
         const {forward, right, up} = this.frame(), eye = this.eye();
         const f = 1 / Math.tan(0.4), aspect = this.canvas.width / this.canvas.height;
-        const near = this.near(), far = near + 8 * this.radius + /** @type {number} */ (this.distance);
+        const near = this.near(), far = near + 8 * this.radius + this.distance;
         const view = [right[0], up[0], -forward[0], 0, right[1], up[1], -forward[1], 0, right[2], up[2], -forward[2], 0,
             -dot(right, eye), -dot(up, eye), dot(forward, eye), 1];
         const perspective = [f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, (far + near) / (near - far), -1, 0, 0, 2 * far * near / (near - far), 0];
@@ -382,14 +427,73 @@ export class Space {
 
     /** @param {number} dx @param {number} dy */
     orbit(dx, dy) {
+        const eye = this.eye();
         this.azimuth = (this.azimuth ?? 0) - dx;
         this.height = clamp((this.height ?? 0) - dy, -1.55, 1.55);
+        if (this.isWalking) this.target = add(eye, this.forward(), this.distance);
         this.move();
     }
-    /** @param {number} factor */
+    /**
+     * Changes the distance of what the view turns about. Where it is close, the view goes on with it.
+     * @param {number} factor
+     */
     dolly(factor) {
-        this.distance = clamp(/** @type {number} */ (this.distance) * factor, 0.01 * this.radius, 8 * this.radius);
+        const distance = this.distance * factor, least = 0.01 * this.radius, kStep = 0.2;
+        if (factor < 1 && distance < least) this.target = add(this.target, this.forward(), -Math.log(factor) * kStep * this.radius);
+        this.distance = clamp(distance, least, 8 * this.radius);
         this.move();
+    }
+
+    /** @param {boolean} begins Or ends. */
+    walk(begins) {
+        this.isWalking = begins;
+        this.pressed.clear();
+        this.walkButton.setAttribute('aria-pressed', String(begins));
+        this.tellSpeed();
+    }
+    tellSpeed() {
+        this.label.textContent = this.isWalking ? `walking: ${significant(this.speed * this.radius, 2)} scene units a second` : '';
+    }
+    /**
+     * Moves the eye for some seconds in the directions of the pressed keys.
+     * @param {number} seconds
+     */
+    step(seconds) {
+        const {forward, right} = this.frame(), axes = [right, this.vertical(), forward];
+        const length = seconds * this.speed * this.radius * (this.runs ? 4 : 1);
+        for (const key of this.pressed) kSteps[key].forEach((v, i) => { this.target = add(this.target, axes[i], v * length); });
+        this.move();
+    }
+    /** Goes on for as long as keys are pressed. */
+    keepWalking() {
+        this.lastStep = performance.now();
+        const go = (/** @type {number} */ now) => {
+            if (this.pressed.size === 0) return;
+            // After a pause of the page, no leap.
+            this.step(clamp((now - this.lastStep) / 1000, 0, 0.1));
+            this.lastStep = now;
+            requestAnimationFrame(go);
+        };
+        requestAnimationFrame(go);
+    }
+    listenToKeys() {
+        const canvas = this.canvas;
+        canvas.addEventListener('keydown', e => {
+            if (!this.isWalking || e.ctrlKey || e.altKey || e.metaKey || !(e.code in kSteps)) return;
+            e.preventDefault();
+            e.stopPropagation();
+            this.runs = e.shiftKey;
+            if (e.repeat || this.pressed.has(e.code)) return;
+            const isFirst = this.pressed.size === 0, kTap = 1 / 60;
+            this.pressed.add(e.code);
+            this.step(kTap);
+            if (isFirst) this.keepWalking();
+        });
+        canvas.addEventListener('keyup', e => {
+            this.runs = e.shiftKey;
+            this.pressed.delete(e.code);
+        });
+        canvas.addEventListener('blur', () => this.pressed.clear());
     }
     /** @param {number} dx @param {number} dy */
     moveCross(dx, dy) {
@@ -398,6 +502,7 @@ export class Space {
     }
 
     listen() {
+        this.listenToKeys();
         const canvas = this.canvas;
         /** @type {{x: number, y: number, kind: 'orbit' | 'pan' | 'point', moved: boolean} | null} */
         let drag = null;
@@ -415,8 +520,8 @@ export class Space {
             const [x, y] = this.at(e);
             if (drag.kind === 'orbit') this.orbit(dx * 0.006, dy * 0.006);
             else if (drag.kind === 'pan') {
-                const {right, up} = this.frame(), f = /** @type {number} */ (this.distance) * 0.85 / canvas.clientHeight;
-                this.target = add(add(/** @type {Vec} */ (this.target), right, -dx * f), up, dy * f);
+                const {right, up} = this.frame(), f = this.distance * 0.85 / canvas.clientHeight;
+                this.target = add(add(this.target, right, -dx * f), up, dy * f);
                 this.move();
             } else this.tell.drag(x, y);
             [drag.x, drag.y] = [e.offsetX, e.offsetY];
@@ -434,7 +539,9 @@ export class Space {
         canvas.addEventListener('contextmenu', e => e.preventDefault());
         canvas.addEventListener('wheel', e => {
             e.preventDefault();
-            this.dolly(Math.exp(e.deltaY * 0.0015));
+            if (!this.isWalking) return this.dolly(Math.exp(e.deltaY * 0.0015));
+            this.speed = clamp(this.speed * Math.exp(-e.deltaY * 0.002), 1e-4, 10);
+            this.tellSpeed();
         }, {passive: false});
     }
 }

@@ -1,6 +1,8 @@
 // @ts-check
 // The image: tone mapped by one shader, with exposure, false colours, error map, zoom, and a wipe between two pictures.
 
+import {fromHalf} from './histogram.js';
+
 /** @typedef {import('./server.js').Picture} Picture */
 
 const kVertex = `#version 300 es
@@ -15,6 +17,7 @@ uniform vec4 selected;                      // corner and size of the selected r
 uniform vec2 extent;                        // the image in its pixels
 uniform float exposure, wipe, scaleFirst, scaleSecond;
 uniform int mode;      // 0 image, 1 false colours; of two pictures: 2 relative, 3 signed, 4 squared difference
+uniform int channel;   // 0 all, 1 red, 2 green, 3 blue, 4 luminance
 uniform int tone;      // 0 sRGB, 1 ACES, 2 Reinhard
 uniform float white;   // luminance that Reinhard maps to white, before the exposure
 uniform bool hasMarks; // whether the selection and the wipe are drawn
@@ -22,16 +25,17 @@ uniform ivec2 grey;    // whether the pictures have one channel
 uniform bool hasSecond;
 out vec4 color;
 
+float luminance(vec3 v) { return dot(v, vec3(0.2126, 0.7152, 0.0722)); }
 vec3 value(sampler2D t, vec2 at, float scale, int isGrey) {
     vec3 v = texture(t, at).rgb * scale;
-    return isGrey != 0 ? v.rrr : v;
+    if (isGrey != 0) return v.rrr;
+    return channel == 0 ? v : vec3(channel == 4 ? luminance(v) : v[channel - 1]);
 }
 vec3 srgb(vec3 v) {
     v = clamp(v, 0.0, 1.0);
     return mix(12.92 * v, 1.055 * pow(v, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, v));
 }
 bool isBad(vec3 v) { return any(isnan(v)) || any(isinf(v)); }
-float luminance(vec3 v) { return dot(v, vec3(0.2126, 0.7152, 0.0722)); }
 // Black, blue, violet, orange, yellow, white.
 vec3 heat(float x) {
     x = clamp(x, 0.0, 1.0) * 5.0;
@@ -114,13 +118,14 @@ export function fit(canvas) {
 export const clamp = (v, low, high) => Math.min(Math.max(v, low), high);
 
 export class View {
-    /** @param {HTMLCanvasElement} canvas @param {{pixel: () => void, wipe: (at: number) => void}} tell */
+    /** @param {HTMLCanvasElement} canvas @param {{pixel: () => void, wipe: (at: number) => void, trace: () => void}} tell */
     constructor(canvas, tell) {
         this.canvas = canvas;
         this.tell = tell;
         this.exposure = 0;
         this.mode = 0;
         this.tone = 0;
+        this.channel = 0;
         /** Of the first picture: its largest luminance. */
         this.white = 1;
         this.wipe = 0.5;
@@ -258,6 +263,7 @@ export class View {
         gl.uniform1f(at('scaleSecond'), 2 ** (b ?? a).picture.scale);
         gl.uniform1i(at('mode'), this.mode);
         gl.uniform1i(at('tone'), this.tone);
+        gl.uniform1i(at('channel'), this.channel);
         gl.uniform1f(at('white'), this.white);
         gl.uniform1i(at('hasMarks'), hasMarks ? 1 : 0);
         gl.uniform2i(at('grey'), a.picture.channels === 1 ? 1 : 0, (b ?? a).picture.channels === 1 ? 1 : 0);
@@ -286,6 +292,24 @@ export class View {
         this.cursor = [clamp(x, 0, this.width - 1), clamp(y, 0, this.height - 1)];
         this.tell.pixel();
         this.redraw();
+    }
+
+    /**
+     * The brightest pixel next to one, where pixels are too small to be hit.
+     * @param {number[]} pixel
+     */
+    brightest([x, y]) {
+        const picture = this.pictures[0]?.picture, kLarge = 4 * devicePixelRatio;
+        if (!picture || picture.columns !== this.width || this.scale() >= kLarge) return [x, y];
+        const luminance = (/** @type {number} */ px, /** @type {number} */ py) => {
+            const at = picture.channels * (py * picture.columns + px), v = (/** @type {number} */ c) => fromHalf(picture.halves[at + c]);
+            return picture.channels === 1 ? v(0) : 0.2126 * v(0) + 0.7152 * v(1) + 0.0722 * v(2);
+        };
+        let best = [x, y];
+        for (let py = Math.max(0, y - 1); py <= Math.min(this.height - 1, y + 1); ++py)
+            for (let px = Math.max(0, x - 1); px <= Math.min(this.width - 1, x + 1); ++px)
+                if (luminance(px, py) > luminance(best[0], best[1])) best = [px, py];
+        return best;
     }
 
     /** The pixel at the cursor, or the rectangle from the corner to it. */
@@ -333,7 +357,10 @@ export class View {
                 const [x, y] = this.place(e.offsetX, e.offsetY);
                 if (x >= 0 && y >= 0 && x < 1 && y < 1) {
                     this.corner = null;
-                    this.moveCursor(Math.floor(x * this.width), Math.floor(y * this.height));
+                    const pixel = [Math.floor(x * this.width), Math.floor(y * this.height)], traces = e.ctrlKey || e.altKey;
+                    const [px, py] = traces ? this.brightest(pixel) : pixel;
+                    this.moveCursor(px, py);
+                    if (traces) this.tell.trace();
                 }
             }
             drag = null;
@@ -351,6 +378,7 @@ export class View {
             else if (e.key === 'z') this.zoomBy(1.5, here);
             else if (e.key === 'x') this.zoomBy(1 / 1.5, here);
             else if (e.key === '0') this.resetZoom();
+            else if (e.key === 't') this.tell.trace();
             else if (e.key === 'r' || e.key === 'Escape') {
                 this.corner = e.key === 'r' && !this.corner ? [...this.cursor] : null;
                 this.moveCursor(this.cursor[0], this.cursor[1]);
