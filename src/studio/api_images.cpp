@@ -262,9 +262,6 @@ void Api::worst(const Request& request, const Done& done) {
 void Api::difference(const Request& request, const Done& done) {
     const auto snapshot = shown(request.query("run").value_or("0"));
     const std::string against = request.query("against").value_or("0");
-    const auto opened = opened_.of_view(against);
-    if (DenoisedImages::run_of(against) || (opened && opened->is_denoised))
-        throw ApiError(422, "a denoised image is biased, so nothing is measured against it");
     std::shared_ptr<const Snapshot> other;
     if (against != "reference")
         other = shown(against);
@@ -276,6 +273,9 @@ void Api::difference(const Request& request, const Done& done) {
     const int width = other ? other->width : options_.reference->width;
     if (width != snapshot->width || reference.size() != snapshot->mean.size())
         throw ApiError(409, "the images differ in size");
+    const auto opened = opened_.of_view(against);
+    if (DenoisedImages::run_of(against) || (opened && opened->is_denoised))
+        throw ApiError(422, "a denoised image is biased, so nothing is measured against it");
     later(workers_, done, [snapshot, other, reference] {
         const ImageErrors errors = image_errors(snapshot->mean, reference);
         const FlipResult flip =

@@ -97,6 +97,7 @@ async function fireflyPart(browser) {
     await browser.until('studio.shown[0].run === 4 && studio.shown[0].passes === 24', 'it is shown');
     const worst = (await browser.evaluate("studio.server.get('/v1/worst?run=4&count=20')")).pixels
         .find(w => w.pass < 23);
+    await browser.evaluate('studio.space().lookAsCamera()');
     const [left, top] = await box(browser, '#view');
     const at = await browser.evaluate(`(() => { const v = studio.view, s = v.scale(), o = v.origin(); return [(o[0] + (${worst.x} + 0.5) * s) / devicePixelRatio, (o[1] + (${worst.y} + 0.5) * s) / devicePixelRatio]; })()`);
     await browser.mouse('mousePressed', left + at[0], top + at[1], {modifiers: 2});

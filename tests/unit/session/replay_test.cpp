@@ -241,14 +241,17 @@ TEST_P(ReplayOfPass, IsThatAfterThePass) {
         }
     }
     EXPECT_GT(paths, 20u);
-    EXPECT_THROW(replay_pass({shared, renderer.settings(), 2, renderer.generation_of(2)}, 0, 1,
-                             std::atomic<bool>(true)),
-                 PassDropped);
+    // Others trace nothing before the samples.
+    const std::string& name = settings.integrator.name;
+    if (name == "path" || name == "bdpt") return;
+    const PassOfRun of{shared, renderer.settings(), 2, renderer.generation_of(2)};
+    EXPECT_THROW(replay_pass(of, 0, 1, std::atomic<bool>(true)), PassDropped);
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, ReplayOfPass,
-                         ::testing::Values("vcm", "vcm:guide=on", "upg", "upg+bdpt", "pcbpt",
-                                           "sppm", "path:guide=on", "bdpt:guide=on",
+                         ::testing::Values("vcm:radius=0.3", "vcm:guide=on,radius=0.3",
+                                           "upg:radius=0.3", "upg+bdpt:radius=0.3", "pcbpt",
+                                           "sppm:radius=0.3", "path:guide=on", "bdpt:guide=on",
                                            "path:specular_connections=auto"));
 
 class LastReplayOf : public ::testing::TestWithParam<const char*> {};

@@ -277,7 +277,7 @@ TEST_F(ApiTest, NamesThePassThatMadeAPixelBright) {
 /// Also of methods that share light paths, or learn.
 TEST_F(ApiTest, TracesThePassThatMadeAPixelBright) {
     open();
-    for (const char* method : {"upg", "pcbpt", "path:guide=on", "vcm", "bdpt:guide=on", "sppm"}) {
+    for (const char* method : {"upg", "pcbpt", "path:guide=on", "vcm", "sppm"}) {
         const int run = finished_run({{"integrator", method}, {"spp", 20}});
         const json worst =
             json::parse(get("/v1/worst?count=3&run=" + std::to_string(run)).body)["pixels"];
