@@ -1,6 +1,7 @@
 #include "geometry/accelerator.h"
 
 #include <cmath>
+#include <memory>
 
 #include <gtest/gtest.h>
 
@@ -55,6 +56,41 @@ TEST(Accelerator, ClosedMeshesHaveNoGaps) {
         missed += !accelerator.intersect(ray, hit) || !accelerator.occluded(ray);
     }
     EXPECT_EQ(missed, 0);
+}
+
+TEST(Accelerator, TakesHierarchiesOfGroupsFromAnEarlierOne) {
+    const TriangleMesh mesh = closed_mesh(60, 120, 1), other = closed_mesh(20, 30, 1);
+    const auto add = [&](Accelerator& a, float x) {
+        const uint32_t groups[] = {a.add_group({&mesh}), a.add_group({&other})};
+        a.add_instance(groups[0], Transform::translate({x, 0, 0}));
+        a.add_instance(groups[1], Transform::translate({-x, 0, 0}));
+        a.commit();
+    };
+    const AcceleratorOptions options;
+    auto earlier = std::make_unique<Accelerator>(options);
+    add(*earlier, 2);
+    Accelerator moved(options, *earlier), fresh(options);
+    add(moved, 3), add(fresh, 3);
+    EXPECT_NEAR(double(moved.memory_bytes()), double(fresh.memory_bytes()),
+                0.2 * double(fresh.memory_bytes()));
+    earlier.reset();
+    testing::Random random(3);
+    int hits = 0;
+    for (int i = 0; i < 10000; ++i) {
+        const Ray ray{random.in_cube() * 5.0f, normalize(random.in_cube()), kInf};
+        RayHit a, b;
+        const bool is_hit = moved.intersect(ray, a);
+        ASSERT_EQ(is_hit, fresh.intersect(ray, b));
+        if (!is_hit) continue;
+        ++hits;
+        EXPECT_EQ(a.t, b.t);
+        EXPECT_EQ(a.prim, b.prim);
+        EXPECT_EQ(a.shape, b.shape);
+        EXPECT_EQ(a.instance, b.instance);
+    }
+    EXPECT_GT(hits, 300);
+    const Accelerator copy = moved;
+    EXPECT_EQ(copy.memory_bytes(), moved.memory_bytes());
 }
 
 /// Images of different machines are the same to the bit only with the same instruction set, which checkpoints name.

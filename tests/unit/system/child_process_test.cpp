@@ -1,0 +1,89 @@
+#include "system/child_process.h"
+
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "system/file_state.h"
+
+namespace etendue {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string text_of(const fs::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+
+TEST(ChildProcess, HasItsArgumentsAndStatus) {
+    const TemporaryFolder folder;
+    const std::string log = folder.path() / "log", shell = find_program("sh");
+    const std::string strange = "a b'\"$HOME;\n*";
+    EXPECT_EQ(
+        run_child({shell, "-c", "printf %s \"$1\"; read x; echo $x >&2; exit 3", "x", strange},
+                  log),
+        3);
+    EXPECT_EQ(text_of(log), strange + "\n");
+    EXPECT_EQ(run_child({shell, "-c", "kill -9 $$"}, log), 128 + 9);
+    EXPECT_THROW(run_child({folder.path() / "none"}, log), std::runtime_error);
+    EXPECT_EQ(find_program("a program that is not there"), "");
+}
+
+TEST(ChildProcess, EndsWithASignalThatIsHeld) {
+    const TemporaryFolder folder;
+    const auto old = std::signal(SIGTERM, SIG_IGN);
+    static volatile std::sig_atomic_t arrived = 0;
+    std::signal(SIGTERM, [](int) { arrived = 1; });
+    {
+        const HeldSignals held;
+        const pthread_t self = pthread_self();
+        std::thread sends([&] {
+            std::this_thread::sleep_for(std::chrono::milliseconds(100));
+            pthread_kill(self, SIGTERM);
+        });
+        EXPECT_THROW(run_child({find_program("sleep"), "60"}, folder.path() / "log"),
+                     std::runtime_error);
+        sends.join();
+        EXPECT_TRUE(HeldSignals::has_one());
+        EXPECT_EQ(arrived, 0);
+    }
+    EXPECT_EQ(arrived, 1);
+    std::signal(SIGTERM, old);
+}
+
+TEST(TemporaryFolder, IsDeletedWithItsFiles) {
+    fs::path path;
+    {
+        const TemporaryFolder folder;
+        path = folder.path();
+        fs::create_directory(path / "inner");
+        std::ofstream(path / "inner/file") << "text";
+    }
+    EXPECT_FALSE(fs::exists(path));
+}
+
+TEST(FileState, TellsFilesThatHaveChanged) {
+    const TemporaryFolder folder;
+    const std::string file = folder.path() / "file";
+    EXPECT_FALSE(file_state(file).is_settled);
+    std::ofstream(file) << "one";
+    const FileState fresh = file_state(file);
+    EXPECT_FALSE(fresh.is_settled);
+    EXPECT_FALSE(file_state(file).has_kept(fresh));  // it may be written again at the same time
+    FileState settled = fresh;
+    settled.is_settled = true;
+    EXPECT_TRUE(file_state(file).has_kept(settled));
+    std::ofstream(file) << "three";
+    EXPECT_FALSE(file_state(file).has_kept(settled));
+}
+
+}  // namespace
+}  // namespace etendue
