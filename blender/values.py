@@ -81,6 +81,8 @@ def product(a: Value, b: Value) -> Value:
 
 def mixture(weight: Value, a: Value, b: Value) -> Value:
     """(1 - weight) a + weight b."""
+    if not is_texture(a) and not is_texture(b) and as_color(a) == as_color(b):
+        return a
     if not is_texture(weight):
         weight = min(max(luminance(weight), 0.0), 1.0)
         if weight == 0.0:
