@@ -421,7 +421,7 @@ def render(
 def render_sensors(
     scene: SceneLike,
     integrator: Method = "",
-    sensors: Iterable[int | str] | None = None,
+    sensors: Iterable[int | str] | int | str | None = None,
     *,
     resolution: tuple[int, int] | None = None,
     threads: int = 0,
@@ -433,7 +433,7 @@ def render_sensors(
         names = left.scene.sensors
 
     scene: a Description, a dict as load_dict() takes it, or a file. A Scene has one sensor only (ValueError).
-    sensors: their numbers (from 0) or names, in the order of the results; None: all sensors of the scene.
+    sensors: their numbers (from 0) or names, in the order of the results, or one of them; None: all sensors of the scene.
     resolution: (width, height) of all images in pixels, instead of those of the scene.
     threads: number of threads; 0 for one per core.
     limits: the other arguments of render(): spp, time and error are those of each image.
@@ -444,6 +444,8 @@ def render_sensors(
     if isinstance(scene, Scene):
         raise ValueError("a Scene has one sensor only: give its Description, or the dict or file that it was made of")
     description = described(scene)
+    if isinstance(sensors, (int, str)):
+        sensors = [sensors]
     chosen: list[int | str] = []
     for sensor in range(len(_scene_of(description, resolution, threads, 0).sensors)) if sensors is None else sensors:
         chosen.append(sensor if isinstance(sensor, str) else whole("sensors", sensor))

@@ -63,6 +63,9 @@ SceneDescription read_scene_file(const std::string& file, const ReadOptions& opt
             fmt::format("{}: unknown kind of scene file \"{}\" (known: .xml, of Mitsuba 0.6 and 3; "
                         ".pbrt, of pbrt-v3 and v4; .gltf and .glb; .usd, .usda, .usdc and .usdz)",
                         file, extension));
+    if (kind->read == read_usd && std::filesystem::path(file).extension() == ".gz")
+        throw std::runtime_error(fmt::format(
+            "{}: stages of USD are not read from packed files; unpack it by gunzip", file));
     if (kind->has_no_parameters && !options.defines.empty())
         throw UnusedDefines(fmt::format("scenes of {} have no parameters", kind->name));
     return read_in_memory(file, [&] { return kind->read(file, options); });

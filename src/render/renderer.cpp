@@ -4,7 +4,9 @@
 #include <array>
 #include <bit>
 #include <exception>
+#include <new>
 #include <numbers>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -27,6 +29,16 @@ namespace {
 
 /// Number of samples in a chunk of parallel work. It does not depend on the number of threads.
 constexpr uint64_t kChunk = 256;
+
+/// The result of `make`; empty where there is not enough memory, for what a rendering can do without.
+template <class Make>
+auto where_there_is_memory(const Make& make) -> std::optional<decltype(make())> {
+    try {
+        return make();
+    } catch (const std::bad_alloc&) {
+        return {};
+    }
+}
 
 /// Integrators learn before passes 0, 1, 4, 16, 64 …; those up to the next learning step are a generation.
 struct LearningStep {
@@ -552,10 +564,15 @@ void Renderer::trace_own_pass(Round& round, const std::atomic<bool>& drop) {
     const uint32_t generation = LearningStep::of(passes).number;
     const bool is_kept = !generations_.empty() && generations_.back()->number == generation;
     // Integrators change what they learn from while they make passes.
-    std::vector<std::byte> learned;
-    if (settings_.keeps_generations && !is_kept) learned = learned_state();
+    std::optional<std::vector<std::byte>> learned;
+    if (settings_.keeps_generations && !is_kept)
+        learned = where_there_is_memory([&] { return learned_state(); });
     Pass(*this, passes + uint32_t(rank), drop).trace();
-    if (settings_.keeps_generations && !is_kept) keep_generation(generation, std::move(learned));
+    if (learned)
+        where_there_is_memory([&] {
+            keep_generation(generation, std::move(*learned));
+            return true;
+        });
     if (settings_.ranks->count() == 1) {
         // From the end of the film's pass to that of add_pass(), nothing may fail, so that all of them have the same passes.
         round.sums = workers_->take_sums();

@@ -56,7 +56,8 @@ struct RenderSettings : RenderOptions {
     /// Whether the film notes the brightest pass of every pixel, see Film::largest(). Passes of chains are not noted.
     bool keeps_largest = false;
     /// Whether what was learned is kept for integrators of which only whole passes can be traced again, see generation_of().
-    /// At most kGenerationBytes are; what was learned first is given up first.
+    /// At most kGenerationBytes are, or those of one generation; what was learned first is given up first. None where there is no
+    /// memory for it.
     bool keeps_generations = false;
     /// The processes that render the image together, each of them by a Renderer with these settings. They must outlive it.
     const Ranks* ranks = &kAlone;

@@ -46,7 +46,7 @@ std::shared_ptr<const Snapshot> DenoisedImages::ask(int run, uint64_t after) {
     {
         const std::lock_guard lock(mutex_);
         if (removed_.contains(run)) throw ApiError(422, fmt::format("run {} was removed", run));
-        problem.swap(problem_);
+        if (problem_run_ == run) problem.swap(problem_);
         const bool is_ours = image_ && image_->run == run;
         if (problem.empty() && noisy && noisy->passes > after &&
             (!is_ours || noisy->passes > image_->passes))
@@ -106,7 +106,10 @@ void DenoisedImages::work() {
         next_ = Clock::now() + rest;
         if (!image && problem.empty()) continue;
         if (image) image_.swap(image);
+        // Asked for during an attempt that failed, it would fail again.
+        if (!problem.empty() && wanted_ == run) wanted_.reset();
         problem_.swap(problem);
+        problem_run_ = run;
         ++version_;
     }
 }

@@ -72,6 +72,7 @@ private:
     std::set<int> removed_;  ///< The session removes a run after its current pass.
     std::shared_ptr<const Snapshot> image_;
     std::string problem_;  ///< Of the last attempt, until it was told.
+    int problem_run_ = 0;
     std::chrono::steady_clock::time_point next_{};
 
     std::thread thread_;

@@ -30,11 +30,18 @@ std::string error_text(int error) {
     return std::generic_category().message(error);
 }
 
+/// As after nohup.
+bool is_ignored(int signal) {
+    struct sigaction action {};
+    return ::sigaction(signal, nullptr, &action) == 0 && action.sa_handler == SIG_IGN;
+}
+
 /// In the child, between fork() and exec(), where only functions are allowed that signal handlers may call.
 [[noreturn]] void become(char* const* argv, int log, int failure, pid_t parent) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != parent) ::_exit(kNotStarted);  // it has ended before
-    for (const int signal : kEnding) ::signal(signal, SIG_DFL);
+    for (const int signal : kEnding)
+        if (!is_ignored(signal)) ::signal(signal, SIG_DFL);
     ::signal(SIGPIPE, SIG_DFL);
     sigset_t none;
     ::sigemptyset(&none);
@@ -74,7 +81,8 @@ int wait_for(pid_t child) {
 HeldSignals::HeldSignals() {
     sigset_t held;
     ::sigemptyset(&held);
-    for (const int signal : kEnding) ::sigaddset(&held, signal);
+    for (const int signal : kEnding)
+        if (!is_ignored(signal)) ::sigaddset(&held, signal);
     ::pthread_sigmask(SIG_BLOCK, &held, &before_);
 }
 
@@ -132,6 +140,8 @@ int run_child(std::vector<std::string> words, const std::string& log) {
     {
         const Descriptor writing(ends[1]);
         const pid_t self = ::getpid();
+        // Where it is ignored, as by what started the program, there would be nothing to wait for.
+        ::signal(SIGCHLD, SIG_DFL);
         child = ::fork();
         if (child == 0) become(argv.data(), output.get(), writing.get(), self);
         if (child < 0)

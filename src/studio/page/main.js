@@ -27,6 +27,8 @@ const runs = new Map();
 const shown = [{run: 0, view: 'image', passes: 0, isAsked: false, busy: false, again: false, isRefused: false}, null];
 /** The pictures that are drawn there, in words. They stay until those that are to be shown have come. */
 const drawn = ['', ''];
+/** Whether the pictures that are drawn are denoised. */
+const drawnDenoised = [false, false];
 /** @type {Space | null} */
 let space = null;
 /** @type {PathEditor | null} */
@@ -119,7 +121,7 @@ async function refresh(place) {
             s.isRefused = true;
             draw(place, null, '');
         }
-        if (e instanceof Refusal && e.status === 422 && s.view === 'denoised' && shown[place] === s) {
+        if (e instanceof Refusal && e.status === 422 && s.view === 'denoised' && shown[place] === s && runs.has(s.run)) {
             banner('denoise', e.message, 'Dismiss', () => banner('denoise', ''));
             tools.denoise.checked = false;
             switchDenoising();
@@ -156,6 +158,8 @@ function textOf(s, passes) {
 /** @param {0 | 1} place @param {import('./server.js').Picture | null} picture @param {string} text */
 function draw(place, picture, text) {
     view.show(place, picture);
+    const s = shown[place];
+    drawnDenoised[place] = !!picture && (s?.view === 'denoised' || /denoised/.test(openedIn(s)?.note ?? ''));
     if (place === 0) updateHistogram(picture);
     drawn[place] = text;
     label();
@@ -305,9 +309,9 @@ async function startSampling() {
 }
 
 async function savePicture() {
+    const ending = drawnDenoised.some(Boolean) ? '.denoised.png' : '.png';
     const png = await view.png();
     if (!png) return;
-    const ending = shown.some(s => s?.view === 'denoised') ? '.denoised.png' : '.png';
     const link = element('a', {href: URL.createObjectURL(png), download: (state?.scene_file ?? 'picture').replace(/\.[^.]*$/, '') + ending});
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 10000);
@@ -350,7 +354,9 @@ async function showPixel() {
         const kNames = {confidence: '± 95 %', upper: '± upper bound (sobol)', 'noise only': '± noise only, without bias', none: isDenoised ? 'denoised, not unbiased' : opened ? 'no interval' : runs.get(s.run)?.seeds ? 'no interval: several seeds' : 'no interval: one chain'};
         const cells = (/** @type {string} */ scope, /** @type {string} */ name, /** @type {string[]} */ values) => element('tr', {}, [element('th', {scope, textContent: name}),
             ...values.map(textContent => element(scope === 'col' ? 'th' : 'td', {textContent}))]);
-        lines.push([x, y, ...(isPixel ? [] : [w, h]), ...p.mean.map((/** @type {number} */ v) => Number.isFinite(v) ? Number(v.toPrecision(7)) : v)].join(' '));
+        const mean = isPixel && p.nan + p.infinite > 0 ? p.mean.map(() => p.nan > 0 ? 'nan' : 'inf')
+            : p.mean.map((/** @type {number} */ v) => Number.isFinite(v) ? Number(v.toPrecision(7)) : v);
+        lines.push([x, y, ...(isPixel ? [] : [w, h]), ...mean, ...(isDenoised ? ['denoised'] : [])].join(' '));
         const kChannels = ['red', 'green', 'blue'];
         // A pixel has few values; those of a rectangle need a row each.
         const statistics = {mean: p.mean, '±': p.half, least: p.least, largest: p.largest, variance: p.variance, reference: p.reference};
