@@ -29,9 +29,12 @@ SeedPhotons::SeedPhotons(std::vector<SeedPhoton> photons) : photons_(std::move(p
 std::span<const SeedPhoton> SeedPhotons::near(Vec3 p, Vec3 n, uint32_t emitter) const {
     if (photons_.empty()) return {};
     const size_t place = splits_.leaf(p) * kSurfaceSides + surface_side(n);
-    const auto [begin, end] = std::ranges::equal_range(photons_.begin() + begin_[place],
-                                                       photons_.begin() + begin_[place + 1],
-                                                       emitter, {}, &SeedPhoton::emitter);
+    const auto first = photons_.begin() + begin_[place],
+               last = photons_.begin() + begin_[place + 1];
+    const auto begin = std::lower_bound(
+        first, last, emitter, [](const SeedPhoton& s, uint32_t e) { return s.emitter < e; });
+    const auto end = std::upper_bound(
+        begin, last, emitter, [](uint32_t e, const SeedPhoton& s) { return e < s.emitter; });
     return {begin, end};
 }
 
