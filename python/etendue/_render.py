@@ -87,7 +87,7 @@ class TechniqueImage:
     t: int
     """Number of eye vertices."""
     kind: str
-    """hit, next_event, connect, stored, splat, hit_lens, merge or gather."""
+    """hit, next_event, connect, stored, splat, hit_lens, merge, gather or specular."""
     weighted: Image
     """Contribution times MIS weight: radiance, shape (H, W, 3). The images of all techniques sum to the image."""
     unweighted: Image
@@ -185,7 +185,7 @@ class Result:
     def technique(self, s: int, t: int, kind: str | None = None) -> TechniqueImage:
         """The images of the technique with s light and t eye vertices.
 
-        kind: "merge", "gather" or "stored" (s = 1 with y_0 of a light path), where another technique has the same s
+        kind: "merge", "gather", "specular" or "stored" (s = 1 with y_0 of a light path), where another technique has the same s
         and t.
         """
         special = ("merge", "gather", "stored")
