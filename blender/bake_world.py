@@ -27,8 +27,7 @@ def bake(blend: str, world: str, image: str, width: int, frame: int, threads: in
     with bpy.data.libraries.load(blend) as (source, target):
         target.worlds = [name for name in source.worlds if name == world]
     scene.world = target.worlds[0]
-    seen: set[str] = set()
-    _fix_light_paths(scene.world.node_tree, seen)
+    _fix_light_paths(scene.world.node_tree, [])
     for thing in bpy.data.objects:  # whose coordinates textures use
         scene.collection.objects.link(thing)
         thing.hide_render = True
@@ -109,17 +108,17 @@ def _set_up(scene: bpy.types.Scene, threads: int) -> None:
     cycles.use_adaptive_sampling = False
 
 
-def _fix_light_paths(tree: bpy.types.NodeTree | None, seen: set[str]) -> None:
+def _fix_light_paths(tree: bpy.types.NodeTree | None, seen: list[bpy.types.NodeTree]) -> None:
     """Replaces Light Path nodes by what light that a surface receives has there, in groups as well."""
-    if tree is None or tree.name in seen:
+    if tree is None or tree in seen:  # a group may have the name of the tree of the world
         return
-    seen.add(tree.name)
+    seen.append(tree)
     for node in list(tree.nodes):
         if node.bl_idname == "ShaderNodeGroup":
             _fix_light_paths(node.node_tree, seen)
         elif node.bl_idname == "ShaderNodeLightPath":
             for output in node.outputs:
-                for link in list(output.links):
+                for link in [link for link in output.links if not link.is_muted]:
                     value = tree.nodes.new("ShaderNodeValue")
                     value.outputs[0].default_value = _RAYS.get(output.name, 0.0)
                     tree.links.new(value.outputs[0], link.to_socket)

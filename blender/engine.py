@@ -131,7 +131,10 @@ class EtendueEngine(bpy.types.RenderEngine):
             raise
         _fill(result, "Combined", _with_alpha(image.image))
         if settings.denoise:
-            _fill(result, DENOISED, _with_alpha(image.denoised()))
+            try:
+                _fill(result, DENOISED, _with_alpha(image.denoised()))
+            except (RuntimeError, MemoryError) as e:  # without it, there is still the image
+                self.report({"WARNING"}, f"etendue: the image is not denoised: {e or type(e).__name__}")
         _fill(result, "Normal", image.aov["normal"])
         _fill(result, "Albedo", image.aov["albedo"])
         _fill(result, "Depth", _depth(image.aov["depth"][..., :1], description["sensor"], resolution(scene.render)))

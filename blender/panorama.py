@@ -114,5 +114,8 @@ def _state_of_block(block: Any) -> tuple[Any, ...]:
     if isinstance(block, bpy.types.Image):
         file = Path(block.filepath_from_user()) if block.filepath else None
         age = file.stat().st_mtime_ns if file and file.is_file() else 0
-        return block.name_full, block.source, tuple(block.size), block.colorspace_settings.name, str(file), age
+        packed = hashlib.sha256(block.packed_file.data).digest() if block.packed_file else b""
+        made = (block.generated_type, tuple(block.generated_color)) if block.source == "GENERATED" else ()
+        return (block.name_full, block.source, tuple(block.size), block.colorspace_settings.name, block.alpha_mode, str(file), age,
+                packed, made)
     return (block.name_full, str(getattr(block, "matrix_world", "")))

@@ -56,7 +56,7 @@ class SceneReader:
                 raise Refused("the scene has no camera")
             sensor = read_camera(scene.camera.evaluated_get(self._depsgraph), scene, self.report)
         self._warn_of_render_settings(scene.render)
-        self._read_world(scene.world)
+        self._read_world(_override(self._depsgraph, "world") or scene.world)
         for instance in self._depsgraph.object_instances:
             self._read_instance(instance)
         shapes = [shape for geometry in self._geometries.values() for shape in self._shapes(geometry)]
@@ -76,13 +76,17 @@ class SceneReader:
     def _read_instance(self, instance: Any) -> None:
         thing = instance.object
         to_world = np.array(instance.matrix_world, dtype=float)
-        if thing.type == "LIGHT":
+        if not instance.show_self:  # only its particles or copies are seen
+            if thing.type == "MESH":
+                self._warn_of_hair(thing)
+        elif thing.type == "LIGHT":
             values = Values(f'light "{thing.name}"', self._images, self.report)
             emitter = read_light(thing.data, to_world, values)
             if emitter is not None:
                 self._objects[self._new_name("light-" + plain_name(thing.name))] = emitter
         elif thing.type == "MESH":
             self._warn_of_ray_visibility(thing)
+            self._warn_of_hair(thing)
             # The graph makes objects anew for each step, but not their data.
             key = (thing.data.as_pointer(), tuple(s.material.name_full if s.material else "" for s in thing.material_slots))
             if key not in self._geometries:
@@ -106,12 +110,17 @@ class SceneReader:
         links = thing.light_linking
         if links.receiver_collection or links.blocker_collection:
             self.report.warn(where, "light linking has no effect")
+
+    def _warn_of_hair(self, thing: Any) -> None:
+        where = f'object "{thing.name}"'
         for system in thing.particle_systems:
             if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
                 self.report.warn(where, f'the hair of "{system.name}" is left out')
 
     def _read_geometry(self, thing: Any) -> _Geometry:
-        names = [self._material(slot.material) for slot in thing.material_slots] or [self._material(None)]
+        override = _override(self._depsgraph, "material")
+        materials = [override] if override else [slot.material for slot in thing.material_slots] or [None]
+        names = [self._material(material) for material in materials]
         mesh = thing.to_mesh()
         try:
             parts = [] if mesh is None else read_parts(
@@ -156,3 +165,9 @@ class SceneReader:
             taken += 1
             result = f"{name}-{taken}"
         return result
+
+
+def _override(depsgraph: Any, kind: str) -> Any:
+    """The material or the world that a view layer has instead of those of its objects; None without one."""
+    override = getattr(depsgraph.view_layer_eval, kind + "_override", None)
+    return override.evaluated_get(depsgraph) if override else None

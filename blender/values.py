@@ -280,6 +280,8 @@ class Values:
         value, index = self.color(node.input("Color")), list(node.node.outputs).index(node.socket)
         if not is_texture(value):
             return value[index]
+        if "channel" in value:  # grey
+            return value
         return {**value, "channel": "rgb"[index]} if value["type"] == "bitmap" else None
 
     def _ShaderNodeCombineColor(self, node: Output) -> Value | None:

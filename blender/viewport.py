@@ -131,7 +131,10 @@ def _sensor(context: Any) -> dict[str, Any]:
         return {"type": "perspective", "to_world": to_world, "fov": fov, "fov_axis": "x", "film": film,
                 "principal_point_offset_x": window[0, 2] / 2, "principal_point_offset_y": -window[1, 2] / 2}
     half = 1 / window[0, 0]
-    return {"type": "orthographic", "to_world": to_world @ np.diag([half, half, half, 1.0]), "film": film}
+    # Such views begin far behind their origin, which lies at the middle of what is looked at.
+    near = np.eye(4)
+    near[2, 3] = min((window[2, 3] + 1) / window[2, 2], 0.0)
+    return {"type": "orthographic", "to_world": to_world @ near @ np.diag([half, half, half, 1.0]), "film": film}
 
 
 def _draw(engine: Any, context: Any, scene: Any, image: np.ndarray) -> None:

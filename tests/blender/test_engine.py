@@ -14,7 +14,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from mathutils import Vector
+from mathutils import Matrix, Vector
 
 import etendue as et
 
@@ -93,6 +93,19 @@ def test_the_denoised_image_is_a_pass_of_its_own(studio, monkeypatch):
     for settings.denoise in (True, False):
         bpy.ops.render.render(write_still=True)
         assert (b"ViewLayer.Denoised.R" in file.read_bytes()) == settings.denoise
+
+
+def test_a_denoiser_that_fails_leaves_the_image(studio, monkeypatch, capfd):
+    furnished(studio)
+    expected = studio.render()
+
+    def fail(_):
+        raise RuntimeError("no memory")
+
+    studio.scene.etendue.denoise = True
+    monkeypatch.setattr(et.Result, "denoised", fail)
+    assert studio.render().mean() == pytest.approx(expected.mean(), rel=0.1)
+    assert "etendue: the image is not denoised: no memory" in "".join(capfd.readouterr())
 
 
 def test_denoising_without_a_library_is_an_error(studio, monkeypatch):
@@ -323,6 +336,26 @@ def test_viewports_render_what_the_camera_sees(studio):
     description = SceneReader(bpy.context.evaluated_depsgraph_get(), studio.folder).read(_sensor(Context))
     image = et.render(et.load_dict(description).build(), "path", spp=16, progress=False).image
     assert image.mean() == pytest.approx(studio.render().mean(), rel=0.02)
+
+
+def test_orthographic_viewports_begin_behind_their_origin(studio):
+    """Blender's matrices of a view from above, whose origin is the point that is looked at: within the sphere."""
+    from etendue_addon.scene import SceneReader
+    from etendue_addon.viewport import _sensor
+
+    studio.world()
+    studio.sphere(at=(0, 0, 0))
+    end, half = 500, 2
+
+    class View:
+        is_perspective = False
+        view_matrix = Matrix()
+        window_matrix = Matrix(((1 / half, 0, 0, 0), (0, 64 / 48 / half, 0, 0), (0, 0, -1 / end, 0), (0, 0, 0, 1)))
+
+    context = types.SimpleNamespace(region=types.SimpleNamespace(width=64, height=48), region_data=View)
+    description = SceneReader(bpy.context.evaluated_depsgraph_get(), studio.folder).read(_sensor(context))
+    result = et.render(et.load_dict(description).build(), "path", spp=1, aovs=["position"], progress=False)
+    assert result.aov["position"][24, 32] == pytest.approx([0, 0, 1], abs=0.1)
 
 
 class FakeEngine:

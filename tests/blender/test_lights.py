@@ -203,6 +203,30 @@ def test_images_of_worlds_are_made_once_for_the_same_nodes(studio, monkeypatch):
     assert change(texture.inputs["Scale"], "default_value", 3) == 8
 
 
+def test_images_of_worlds_are_made_again_for_changed_pixels(studio, monkeypatch):
+    """Of generated images, and of packed ones."""
+    module, made = sys.modules["etendue_addon.panorama"], []
+    monkeypatch.setattr(module, "_render", lambda *_: made.append(None))
+    monkeypatch.setattr(module, "_images", {})
+    tree, background = studio.world()
+    environment = tree.nodes.new("ShaderNodeTexEnvironment")
+    environment.projection = "MIRROR_BALL"
+    environment.image = image = bpy.data.images.new("Grid", 8, 8)
+    tree.links.new(environment.outputs[0], background.inputs["Color"])
+    studio.plane(material=gray(studio))
+    studio.light(**LIGHTS["sun"])
+    studio.render()
+    assert len(made) == 1
+    image.generated_color = (0.5, 0.2, 0.1, 1)
+    studio.render()
+    assert len(made) == 2
+    for value, count in ((0.25, 3), (0.25, 3), (0.75, 4)):
+        image.pixels.foreach_set(np.full(4 * 8 * 8, value, np.float32))
+        image.pack()
+        studio.render()
+        assert len(made) == count
+
+
 def test_light_paths_of_a_world_are_those_of_diffuse_light(studio, coarse, capfd):
     """The backdrop that the camera alone sees is left out, with a message."""
     tree, background = studio.world((1, 0.5, 0.2))

@@ -91,6 +91,35 @@ def test_instances_of_geometry_nodes(studio):
     assert [v["type"] for v in description(studio).values() if isinstance(v, dict)].count("instance") == 9
 
 
+def test_emitters_of_particles_may_be_hidden(studio, capfd):
+    """The particles are seen, the object from which they come is not."""
+    ball = studio.sphere(diffuse(studio), at=(0, 0, 9), radius=0.2, name="Ball")
+    source = studio.plane(2, diffuse(studio), "Source", at=(0, 0, 1))
+    source.modifiers.new("Particles", "PARTICLE_SYSTEM")
+    settings = source.particle_systems[0].settings
+    settings.count, settings.frame_start, settings.frame_end, settings.physics_type = 20, 0, 1, "NO"
+    settings.render_type, settings.instance_object = "OBJECT", ball
+    source.show_instancer_for_render = source.show_instancer_for_viewport = False
+    studio.scene.frame_set(5)
+    studio.plane(material=diffuse(studio))
+    studio.world()
+    assert not any(name.startswith("Source") for name in description(studio))
+    assert_same(studio)
+
+
+def test_materials_and_worlds_of_a_view_layer(studio):
+    """They replace those of the objects and of the scene."""
+    studio.sphere(diffuse(studio), at=(0, 0, 0.5), radius=0.5)
+    studio.plane(material=diffuse(studio))
+    layer = bpy.context.view_layer
+    layer.material_override, _, _ = studio.material("ShaderNodeBsdfDiffuse", "Clay", Color=(0.1, 0.6, 0.2))
+    studio.world((1, 0.2, 0.1))
+    if hasattr(layer, "world_override"):
+        layer.world_override = studio.scene.world
+        studio.world((0, 0, 1))
+    assert_same(studio)
+
+
 def test_emitting_instances_are_meshes(studio):
     emitter, _, _ = studio.material("ShaderNodeEmission", "Lamp", Strength=5.0)
     first = studio.sphere(emitter, at=(-1, 0, 1), radius=0.2)

@@ -73,6 +73,7 @@ VALUES = {
     "ramp, alpha": lambda t: ramp(t, t.image((0.2,) * 3, (0.9,) * 3), [(0, (*A, 0.7)), (1, (*B, 0.1))], "Alpha"),
     "ramp of a constant, alpha": lambda t: ramp(t, 0.4, [(0, (*A, 0.7)), (1, (*B, 0.1))], "Alpha"),
     "separate red": lambda t: t.node("SeparateColor", {0: t.image()}).outputs[0],
+    "separate green of an alpha": lambda t: t.node("SeparateColor", {0: t.image((*A, 0.7), (*B, 0.4), "Alpha")}).outputs[1],
     "separate green": lambda t: t.node("SeparateColor", {0: t.image()}).outputs[1],
     "separate blue of a constant": lambda t: t.node("SeparateColor", {0: A}).outputs[2],
     "combine": lambda t: t.node("CombineColor", {0: 0.7, 1: 0.2, 2: t.constant(0.4)}).outputs[0],
