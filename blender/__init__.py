@@ -2,7 +2,7 @@
 
 import bpy
 
-from . import panels, settings
+from . import panels, panorama, settings
 from .engine import EtendueEngine
 from .export import ExportEtendueScene, menu
 
@@ -21,3 +21,4 @@ def unregister() -> None:
     bpy.utils.unregister_class(ExportEtendueScene)
     bpy.utils.unregister_class(EtendueEngine)
     settings.unregister()
+    panorama.forget()

@@ -45,6 +45,15 @@ def panorama(world: Any, frame: int, threads: int, where: str) -> str | None:
     return image
 
 
+def forget() -> None:
+    """Deletes all images."""
+    global _folder
+    _images.clear()
+    if _folder is not None:
+        _folder.cleanup()
+        _folder = None
+
+
 def _render(world: Any, name: str, frame: int, threads: int, where: str) -> str | None:
     global _folder
     if _folder is None:

@@ -227,6 +227,18 @@ def test_images_of_worlds_are_made_again_for_changed_pixels(studio, monkeypatch)
         assert len(made) == count
 
 
+def test_images_of_worlds_are_deleted_with_the_add_on(studio, coarse):
+    module = sys.modules["etendue_addon.panorama"]
+    noisy(*studio.world())
+    studio.plane(material=gray(studio))
+    first = studio.render()
+    folder = Path(module._folder.name)
+    assert list(folder.glob("*.exr"))
+    module.forget()
+    assert not folder.exists() and not module._images
+    assert studio.render().mean() == pytest.approx(first.mean(), rel=0.05)
+
+
 def test_light_paths_of_a_world_are_those_of_diffuse_light(studio, coarse, capfd):
     """The backdrop that the camera alone sees is left out, with a message."""
     tree, background = studio.world((1, 0.5, 0.2))
