@@ -80,6 +80,7 @@ class SceneReader:
             if thing.type == "MESH":
                 self._warn_of_hair(thing)
         elif thing.type == "LIGHT":
+            self._warn_of_ray_visibility(thing)
             values = Values(f'light "{thing.name}"', self._images, self.report)
             emitter = read_light(thing.data, to_world, values)
             if emitter is not None:

@@ -331,6 +331,8 @@ def test_what_lights_ignore_is_a_warning(studio, capfd):
     studio.light("SPOT", energy=100, shadow_soft_size=0.5, name="Torch").use_shadow = False
     studio.scene.objects["Plane"].visible_glossy = studio.scene.objects["Plane"].visible_shadow = False
     studio.scene.objects["Plane"].is_shadow_catcher = True
+    studio.scene.objects["Torch"].visible_glossy = False
+    studio.scene.objects["Light"].light_linking.receiver_collection = bpy.data.collections.new("Lit")
     studio.scene.render.use_motion_blur = studio.scene.render.film_transparent = True
     studio.render()
     said = capfd.readouterr()
@@ -338,6 +340,8 @@ def test_what_lights_ignore_is_a_warning(studio, capfd):
     assert 'light "Light": the spread has no effect' in said
     assert 'light "Torch": the spot light is a point' in said
     assert 'light "Torch": a light without shadows casts shadows' in said
-    assert 'object "Plane": ray visibility has no effect' in said
+    for name in ("Plane", "Torch"):
+        assert f'object "{name}": ray visibility has no effect' in said
+    assert 'object "Light": light linking has no effect' in said
     assert 'object "Plane": is a shadow catcher, which has no effect' in said
     assert "render settings: motion blur has no effect" in said and "a transparent film has no effect" in said
