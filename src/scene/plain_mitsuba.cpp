@@ -27,9 +27,12 @@ void check_types(const SceneDescription& scene) {
 }
 
 void replace_integrator(PlainScene& s, SceneObject& o) {
-    const bool has_media =
-        std::any_of(s.original().objects.begin(), s.original().objects.end(),
-                    [](const SceneObject& any) { return any.category == "medium"; });
+    // Mitsuba's path and direct ignore media, and count passing through a mask as a vertex.
+    const bool needs_volpath = std::any_of(
+        s.original().objects.begin(), s.original().objects.end(), [](const SceneObject& any) {
+            return any.category == "medium" ||
+                   (any.category == "bsdf" && (any.type == "mask" || any.type == "null"));
+        });
     // Wrappers and integrators without an image become their inner one, or path.
     SceneObject inner = o;
     for (const SceneObject* at = &o; at;) {
@@ -41,11 +44,12 @@ void replace_integrator(PlainScene& s, SceneObject& o) {
     o.params = inner.params;
     o.children.clear();
     const bool is_direct = inner.type == "direct";
-    o.type = is_direct ? "direct" : has_media ? "volpath" : "path";
+    o.type = needs_volpath ? "volpath" : is_direct ? "direct" : "path";
     std::erase_if(o.params, [&](const Param& p) {
         return p.name != "hide_emitters" &&
                (is_direct || (p.name != "max_depth" && p.name != "rr_depth"));
     });
+    if (is_direct && needs_volpath) set(o, "max_depth", int64_t{2});
 }
 
 void replace_film(SceneObject& o) {

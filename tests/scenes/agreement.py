@@ -168,7 +168,9 @@ def write_stretched_environment(file, source):
 def adapt_to_mitsuba(scene, integrator, folder):
     """Changes `scene`, the root element of a file of `folder`: what the file means here, said in the words of
     Mitsuba 3.9; see docs/agreement.md."""
-    if any(scene.iter("medium")):
+    # Mitsuba's path ignores media, and counts surfaces without an effect as vertices.
+    clear = any(b.get("type") in ("mask", "null") for b in scene.iter("bsdf"))
+    if clear or any(scene.iter("medium")):
         integrator.set("type", "volpath")
     # Pixels at the edge are sampled beyond the border here.
     for film in scene.iter("film"):

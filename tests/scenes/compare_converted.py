@@ -67,9 +67,6 @@ class Converted:
             integrator.remove(child)
         integrator.set("type", "path")
         ElementTree.SubElement(integrator, "integer", name="max_depth", value=str(self.max_depth))
-        # Only volpath, as everything here, does not count surfaces without an effect as vertices.
-        if any(b.get("type") in ("mask", "null") for b in scene.iter("bsdf")):
-            integrator.set("type", "volpath")
         tree.write(self.ours)
         agreement.adapt_to_mitsuba(scene, integrator, folder)
         self.theirs = folder / "mitsuba.xml"

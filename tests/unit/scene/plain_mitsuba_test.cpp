@@ -182,6 +182,29 @@ TEST(PlainMitsuba, EveryIntegratorBecomesOneOfMitsuba) {
     }
 }
 
+/// Of Mitsuba's integrators, `path` and `direct` ignore media, and count passing through a surface without an effect.
+TEST(PlainMitsuba, IntegratorsSeeMediaAndPassThroughMasks) {
+    const std::string ink = R"(<shape type="sphere"><bsdf type="null"/>
+        <medium type="homogeneous" name="interior"><float name="albedo" value="0"/></medium></shape>)";
+    const std::string mask = R"(<shape type="sphere"><bsdf type="mask"/></shape>)";
+    const auto converted = [](const std::string& integrator, const std::string& shape) {
+        SceneDescription scene = parsed(integrator + shape);
+        make_plain_mitsuba(scene);
+        const SceneObject& o = only(scene, "integrator");
+        const Param* depth = o.find("max_depth");
+        return fmt::format("{} {}", o.type, depth ? std::get<int64_t>(depth->value) : -1);
+    };
+    const std::string path =
+        R"(<integrator type="path"><integer name="max_depth" value="5"/></integrator>)";
+    const std::string direct = R"(<integrator type="direct"/>)";
+    EXPECT_EQ(converted(path, ""), "path 5");
+    EXPECT_EQ(converted(direct, ""), "direct -1");
+    for (const std::string& shape : {ink, mask}) {
+        EXPECT_EQ(converted(path, shape), "volpath 5") << shape;
+        EXPECT_EQ(converted(direct, shape), "volpath 2") << shape;
+    }
+}
+
 TEST(PlainMitsuba, SkyIsSunAndSkyWithoutSun) {
     SceneDescription scene = parsed(R"(<emitter type="sky"><float name="scale" value="3"/>
         <integer name="resolution" value="64"/></emitter>)");
