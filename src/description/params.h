@@ -2,6 +2,7 @@
 // Typed access to the parameters of one scene object, and their check against the table of the plug-in. The check and
 // `etendue list` use the same `PluginInfo`.
 
+#include <algorithm>
 #include <functional>
 #include <initializer_list>
 #include <optional>
@@ -45,6 +46,11 @@ struct PluginInfo {
     const char* name;
     const char* doc;  ///< One sentence with its source.
     std::vector<ParamInfo> params;
+
+    bool has_param(std::string_view param) const {
+        return std::any_of(params.begin(), params.end(),
+                           [&](const ParamInfo& p) { return param == p.name; });
+    }
 };
 
 /// The parameters of `object`, by name. Every getter returns the default where the parameter is absent, and throws

@@ -1,6 +1,6 @@
 // Bidirectional path tracing [Veach & Guibas 1994; Lafortune & Willems 1993]: all techniques C(s,t), combined by the power
-// heuristic; with specular_connections=on also X(s,t). Unbiased. The eye path of a pixel is connected to one light path. Joins with a small contribution pass Russian
-// roulette before their shadow ray (Bidirectional::add()).
+// heuristic, and specular connections X(s,t). Unbiased. The eye path of a pixel is connected to one light path. Joins with a
+// small contribution pass Russian roulette before their shadow ray (Bidirectional::add()).
 
 #include "integrator/bdpt.h"
 
@@ -110,8 +110,8 @@ public:
     uint64_t light_paths(const Scene& scene) const override {
         return given_light_paths_ > 0 ? given_light_paths_ : scene.film().pixel_count();
     }
-    bool samples_alone() const override {
-        return !paths_.guiding().is_on() && !paths_.specular().is_on();
+    bool samples_alone(const Scene& scene) const override {
+        return !paths_.guiding().is_on() && !paths_.specular().is_prepared_for(scene);
     }
     Estimator estimator() const override { return Estimator::Unbiased; }
     std::vector<std::pair<std::string, double>> figures() const override {

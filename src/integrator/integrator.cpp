@@ -66,7 +66,7 @@ std::string IntegratorSpec::to_string() const {
 }
 
 IntegratorParams::IntegratorParams(const IntegratorSpec& spec, const PluginInfo& info)
-    : integrator_(spec.name), guide_(spec.guide) {
+    : integrator_(spec.name), guide_(spec.guide), specular_pilots_(spec.specular_pilots) {
     std::vector<std::string> known;
     for (const ParamInfo& p : info.params) {
         values_[p.name] = p.fallback;

@@ -15,6 +15,8 @@
 
 namespace etendue {
 
+struct SpecularPilots;
+
 /// Statistical nature of an estimator; written into reports and images.
 enum class Estimator { Unbiased, Consistent, Biased };
 
@@ -67,9 +69,9 @@ public:
     virtual uint64_t light_path_memory() const { return 0; }
     /// Whether contributions are reported together with their sub-paths, which `verify` needs to identify the paths.
     virtual bool keeps_paths() const { return true; }
-    /// Whether sample() needs nothing that trace() and learn() leave, apart from the Russian roulette of joins. Any
+    /// Whether sample() needs nothing that trace(), learn() and prepare() leave, apart from the Russian roulette of joins. Any
     /// sample can then be traced again without the rest of its pass.
-    virtual bool samples_alone() const { return false; }
+    virtual bool samples_alone(const Scene&) const { return false; }
     virtual Estimator estimator() const = 0;
     /// Number of independent groups of passes, for integrators whose passes depend on each other: pass i belongs to
     /// group i modulo this number. 0 if all passes are independent.
@@ -91,6 +93,8 @@ struct IntegratorSpec {
     /// The guide of an integrator with guide=on, which takes it as it is and learns none; otherwise empty. For tests, and for
     /// the pilots of `auto`.
     std::shared_ptr<const Guide> guide = nullptr;
+    /// For the pilots of `auto`; otherwise empty.
+    std::shared_ptr<SpecularPilots> specular_pilots = nullptr;
 
     /// Throws std::runtime_error with one clear message.
     static IntegratorSpec parse(const std::string& text);
@@ -128,6 +132,7 @@ public:
     float number(const char* name, float low, float high) const;
     const std::string& integrator() const { return integrator_; }
     const std::shared_ptr<const Guide>& given_guide() const { return guide_; }
+    const std::shared_ptr<SpecularPilots>& specular_pilots() const { return specular_pilots_; }
 
 private:
     [[noreturn]] void refuse_choice(const char* name, const std::vector<std::string>& known) const;
@@ -135,6 +140,7 @@ private:
     std::map<std::string, std::string> values_;
     std::string integrator_;
     std::shared_ptr<const Guide> guide_;
+    std::shared_ptr<SpecularPilots> specular_pilots_;
 };
 
 struct IntegratorEntry {

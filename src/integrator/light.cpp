@@ -53,7 +53,7 @@ public:
     std::vector<std::pair<std::string, double>> figures() const override {
         return guiding_.figures();
     }
-    bool samples_alone() const override { return !guiding_.is_on(); }
+    bool samples_alone(const Scene&) const override { return !guiding_.is_on(); }
     Estimator estimator() const override { return Estimator::Unbiased; }
 
 private:

@@ -1,8 +1,8 @@
 // Path tracing with next event estimation [Kajiya 1986; Veach 1997, §9.3].
 //
-// Techniques: C(0,t) hits and C(1,t) next events, combined by the power heuristic. Unbiased. Limits: light of small
-// emitters that reaches diffuse surfaces by way of mirrors or glass is found only by chance. The same light of point
-// and directional emitters is never found. With specular_connections=on, X(s,t) finds both where the glass is smooth.
+// Techniques: C(0,t) hits, C(1,t) next events, and specular connections X(s,t), combined by the power heuristic. Unbiased.
+// Limits: light of small emitters that reaches diffuse surfaces by way of mirrors or glass is found only by chance, unless
+// X(s,t) finds it: if they are smooth. The same light of point and directional emitters is never found by chance.
 
 #include "integrator/path.h"
 
@@ -64,7 +64,9 @@ public:
         specular_.add_figures(figures);
         return figures;
     }
-    bool samples_alone() const override { return !guiding_.is_on() && !specular_.is_on(); }
+    bool samples_alone(const Scene& scene) const override {
+        return !guiding_.is_on() && !specular_.is_prepared_for(scene);
+    }
     Estimator estimator() const override { return Estimator::Unbiased; }
 
 private:

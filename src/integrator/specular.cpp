@@ -1,17 +1,16 @@
 #include "integrator/specular.h"
 
+#include "integrator/seed_photon_walks.h"
 #include "integrator/specular_pilot.h"
-#include "pathspace/walk.h"
-#include "sampler/pilot_seed.h"
 
 namespace etendue {
 
 std::vector<ParamInfo> Specular::params() {
     return {
-        {"specular_connections", ParamKind::String, "off",
+        {"specular_connections", ParamKind::String, "auto",
          "`on`: eye vertices are also connected to lamps by way of smooth glass and mirrors, for "
          "light that otherwise only hits find. `auto`: on where some walks before the first pass "
-         "show that it helps. See the page on specular connections."},
+         "show that it helps. `off`: never. See the page on specular connections."},
         {"specular_depth", ParamKind::Int, "4",
          "Largest number of reflections and refractions of such a connection, in [1, 8]."}};
 }
@@ -22,60 +21,52 @@ Specular::Specular(const IntegratorParams& p) {
     mode_ = p.choice("specular_connections", kModes);
     is_used_ = mode_ != Mode::Off;
     depth_ = p.integer("specular_depth", 1, ChainEvents::kMost);
+    method_ = p.integrator();
+    pilots_ = p.specular_pilots();
 }
 
-namespace {
-
-/// Walks from lamps that go on by delta events alone, with random numbers that no pass uses.
-SeedPhotons trace_photons(const PassContext& pass, const TechniqueCounts& counts) {
-    constexpr uint64_t kWalks = 1 << 17, kBlock = 1024;
-    const uint64_t seed = pilot_seed(pass.seed, PilotUse::SpecularSeeds);
-    std::vector<std::vector<SeedPhoton>> blocks(kWalks / kBlock);
-    const TechniqueCounts unguided{.connect = 1, .specular_depth = counts.specular_depth};
-    pass.for_each_other_path(blocks.size(), [&](uint64_t b, Sampler&, Workspace& work) {
-        Sampler sampler(SamplerKind::Independent, seed);
-        RenderStats stats;  // not of the image
-        const int longest = counts.specular_depth + 2;
-        const WalkContext walk{pass.scene, unguided, stats, {longest, longest}};
-        SubPath& y = work.y;
-        for (uint64_t i = b * kBlock; i < (b + 1) * kBlock; ++i) {
-            sampler.start(0, i);
-            if (!start_light_path(walk, sampler, y)) continue;
-            while (y.size() < longest && extend<TransportMode::Importance>(walk, sampler, y)) {
-                const Vertex &v = y[y.size() - 1], &before = y[y.size() - 2];
-                if (y.size() > 2 && !before.is_delta) break;
-                if (y.size() > 2 && v.is_connectible)
-                    blocks[b].push_back({v.p, side_normal(v), before.p, y[0].emitter->index});
-            }
+void Specular::prepare(const PassContext& pass, const DepthOptions& depth, TechniqueCounts counts) {
+    // Few photons tell whether connections are worth their time, and are enough for pilots.
+    constexpr uint64_t kWalks = 1 << 17, kWalksOfPilot = 1 << 14;
+    if (mode_ == Mode::Off || pass.film.passes() > 0) return;
+    is_used_ = pass.scene.may_have_chains();
+    if (!is_used_) return;
+    const auto photons = [&](uint64_t walks) {
+        return std::make_shared<const SeedPhotons>(trace_seed_photons(pass, depth_, walks));
+    };
+    const bool is_pilot = pilots_ != nullptr;
+    SpecularPilots own;
+    SpecularPilots& pilots = is_pilot ? *pilots_ : own;
+    if (!pilots.photons && (is_pilot || mode_ == Mode::Auto))
+        pilots.photons = photons(kWalksOfPilot);
+    if (mode_ == Mode::Auto) {
+        counts.specular_depth = depth_;
+        auto known = pilots.is_worthwhile.find(method_);
+        if (known == pilots.is_worthwhile.end()) {
+            const SpecularPilot pilot = run_specular_pilot(pass, depth, counts, *pilots.photons);
+            known = pilots.is_worthwhile.emplace(method_, pilot.is_worthwhile()).first;
         }
-    });
-    std::vector<SeedPhoton> all;
-    for (const std::vector<SeedPhoton>& block : blocks)
-        all.insert(all.end(), block.begin(), block.end());
-    return SeedPhotons(std::move(all));
-}
-
-}  // namespace
-
-void Specular::prepare(const PassContext& pass, const DepthOptions& depth,
-                       const TechniqueCounts& counts) {
-    if (pass.film.passes() > 0 || counts.specular_depth == 0) return;
-    photons_ = trace_photons(pass, counts);
-    if (mode_ != Mode::Auto) return;
-    is_used_ = run_specular_pilot(pass, depth, counts, photons_).is_worthwhile();
-    if (!is_used_) photons_ = {};
+        is_used_ = known->second;
+    }
+    if (is_used_) photons_ = is_pilot ? pilots.photons : photons(kWalks);
 }
 
 void Specular::save(LearnedState& to) const {
-    if (!is_on()) return;
+    if (mode_ == Mode::Off) return;
     to.put(is_used_);
-    if (is_used_) photons_.save(to);
+    to.put(photons_ != nullptr);
+    if (photons_) photons_->save(to);
 }
 
 void Specular::load(LearnedState& from) {
-    if (!is_on()) return;
+    if (mode_ == Mode::Off) return;
+    bool has_photons = false;
     from.get(is_used_);
-    if (is_used_) photons_.load(from);
+    from.get(has_photons);
+    if (!has_photons) return;
+    SeedPhotons photons;
+    photons.load(from);
+    photons_ = std::make_shared<const SeedPhotons>(std::move(photons));
 }
 
 void Specular::add_figures(std::vector<std::pair<std::string, double>>& figures) const {

@@ -1,9 +1,18 @@
 #pragma once
 
+#include <map>
+#include <memory>
+
 #include "integrator/integrator.h"
 #include "manifold/specular_connection.h"
 
 namespace etendue {
+
+/// What the pilots of `auto` prepare once for all of them. Not for two renderings at a time.
+struct SpecularPilots {
+    std::shared_ptr<const SeedPhotons> photons;
+    std::map<std::string, bool> is_worthwhile;  ///< By method.
+};
 
 /// Specular connections as an option of integrators.
 class Specular {
@@ -12,17 +21,19 @@ public:
     Specular() = default;
     explicit Specular(const IntegratorParams& params);
 
-    /// Traces the photons from which searches begin. With `specular_connections=auto`, decides before pass 0 whether the rendering
-    /// uses specular connections. `counts`: those of the method where it does. For Integrator::prepare().
-    void prepare(const PassContext& pass, const DepthOptions& depth, const TechniqueCounts& counts);
-    /// Whether prepare() prepares anything.
-    bool is_on() const { return mode_ != Mode::Off; }
+    /// Before pass 0, decides with `specular_connections=auto` whether the rendering uses specular connections, and traces the
+    /// photons from which searches begin. `counts`: those of the method where it does. For Integrator::prepare().
+    void prepare(const PassContext& pass, const DepthOptions& depth, TechniqueCounts counts);
+    /// Whether prepare() prepares anything for this scene.
+    bool is_prepared_for(const Scene& scene) const {
+        return mode_ != Mode::Off && scene.may_have_chains();
+    }
     void save(LearnedState& to) const;
     void load(LearnedState& from);
     /// See Integrator::figures().
     void add_figures(std::vector<std::pair<std::string, double>>& figures) const;
 
-    /// TechniqueCounts::specular_depth: 0 where the scene has nothing that a chain could consist of. Before decide(), that of
+    /// TechniqueCounts::specular_depth: 0 where the scene has nothing that a chain could consist of. Before prepare(), that of
     /// a rendering that uses them.
     int depth(const Scene& scene) const { return is_used_ && scene.may_have_chains() ? depth_ : 0; }
     /// Adds the hit, times `factor`, with the weight that it has beside specular connections.
@@ -43,7 +54,7 @@ public:
     void add(const SampleContext& c, int t, int max_depth, float threshold,
              const TechniqueCounts& counts, Workspace& work) const {
         const SpecularLimits limits{
-            .max_depth = max_depth, .threshold = threshold, .photons = &photons_};
+            .max_depth = max_depth, .threshold = threshold, .photons = photons_.get()};
         if (const auto j = join_specular(c.scene, work.z, t, limits, c.sampler, counts, work))
             c.sink.add(*j, j->contribution);
     }
@@ -53,7 +64,9 @@ private:
     Mode mode_ = Mode::Off;
     bool is_used_ = false;
     int depth_ = 0;
-    SeedPhotons photons_;
+    std::shared_ptr<const SeedPhotons> photons_;
+    std::string method_;
+    std::shared_ptr<SpecularPilots> pilots_;  ///< Null in renderings that are no pilots.
 };
 
 }  // namespace etendue

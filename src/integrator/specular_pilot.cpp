@@ -14,6 +14,8 @@ constexpr int kTiles = 8;  // along each side of the image
 constexpr uint64_t kWalks = 4096, kBlock = 64;
 /// Longer searches are as costly as if they had so many trials, and longer.
 constexpr uint64_t kMostTrials = 512;
+/// Time of a ray of a chain, with its derivatives in double, relative to another ray: 1.5 on lantern, 2 on water-caustic.
+constexpr double kChainRay = 2;
 
 size_t tile_of(const FilmGeometry& g, Vec2 film) {
     const auto along = [](float x, int begin, int size) {
@@ -38,7 +40,7 @@ struct TileSums {
 
 struct Block {
     std::array<TileSums, size_t(kTiles) * kTiles> tiles;
-    double rays_without = 0, rays_of_chains = 0;
+    double rays_without = 0, chain_rays = 0;
 };
 
 /// Adds the contributions of one eye walk.
@@ -115,18 +117,18 @@ SpecularPilot run_specular_pilot(const PassContext& pass, const DepthOptions& de
                      block.tiles[tile_of(film, work.z.film)]);
         }
         block.rays_without += double(work.stats.walk_rays + work.stats.shadow_rays);
-        block.rays_of_chains += double(work.stats.chain_rays);
+        block.chain_rays += double(work.stats.chain_rays);
         work.stats = of_image;  // The pilot is not a part of it.
     });
     Block sum;
     for (const Block& b : blocks) {
         for (size_t i = 0; i < sum.tiles.size(); ++i) sum.tiles[i] += b.tiles[i];
         sum.rays_without += b.rays_without;
-        sum.rays_of_chains += b.rays_of_chains;
+        sum.chain_rays += b.chain_rays;
     }
     SpecularPilot result;
     result.rays_without = sum.rays_without;
-    result.rays_with = sum.rays_without + sum.rays_of_chains;
+    result.rays_with = sum.rays_without + kChainRay * sum.chain_rays;
     for (const TileSums& t : sum.tiles) {
         if (!(t.light > 0)) continue;
         const double relative = sqr(t.walks / t.light);

@@ -16,7 +16,7 @@ struct SpecularPilot {
     double moment_without = 0, moment_with = 0;
     double moment_of_hits =
         0;  ///< Part of moment_without: of hits of paths that a specular connection may make.
-    double rays_without = 0, rays_with = 0;
+    double rays_without = 0, rays_with = 0;  ///< As many as take the same time.
 
     bool is_worthwhile() const {
         constexpr double kLeastShare = 0.01;

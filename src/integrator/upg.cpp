@@ -2,9 +2,8 @@
 // dropped, and the other is joined by a shadow ray to the predecessor of the dropped one. Bernoulli trials estimate the
 // reciprocal of the probability that the pair was found.
 //
-// Techniques: U(s,t), for paths of three edges and more; `upg+bdpt` also has C(s,t), and with specular_connections=on
-// X(s,t). Unbiased for the paths it can make. `upg` alone cannot make short paths, and paths where every vertex, or both of its neighbours, scatter by delta
-// events.
+// Techniques: U(s,t), for paths of three edges and more; `upg+bdpt` also has C(s,t) and X(s,t). Unbiased for the paths it can
+// make. `upg` alone cannot make short paths, and paths where every vertex, or both of its neighbours, scatter by delta events.
 
 #include "integrator/upg.h"
 

@@ -8,7 +8,7 @@ namespace {
 
 /// Costs of what is counted, in seconds; fitted by bench/method-costs.
 constexpr double kLightPath = 0.03e-6, kWalkRay = 0.36e-6, kShadowRay = 0.28e-6, kPair = 0.16e-6,
-                 kTrialRay = 1.23e-6;
+                 kTrialRay = 1.23e-6, kChainRay = 0.60e-6;
 /// The same counters cost so much more where directions at surfaces are guided: 1.3 to 1.9 times on six scenes. Where only emission is
 /// guided, they cost up to a fifth more.
 constexpr double kGuided = 1.6;
@@ -42,11 +42,15 @@ double simulated_seconds(const std::string& method, bool is_guided, const Render
     return cost_of(method).factor * guided_factor(is_guided) *
            (kLightPath * double(s.light_paths) + kWalkRay * double(s.walk_rays) +
             kShadowRay * double(s.shadow_rays) + kPair * double(s.pairs) +
-            kTrialRay * double(s.trial_rays));
+            kTrialRay * double(s.trial_rays) + kChainRay * double(s.chain_rays));
 }
 
 double typical_sample_seconds(const std::string& method) {
     return cost_of(method).sample_seconds;
+}
+
+double specular_pilot_seconds() {
+    return 0.03;
 }
 
 double training_seconds(uint64_t walks) {

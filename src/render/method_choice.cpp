@@ -12,6 +12,7 @@
 
 #include "description/json_text.h"
 #include "integrator/auto.h"
+#include "integrator/specular.h"
 #include "render/candidates.h"
 #include "render/cost_table.h"
 #include "render/learned_guide.h"
@@ -79,11 +80,11 @@ struct Contender {
     bool has_chains() const { return candidate_method(method()).has_chains; }
     /// Pilots with chains are too few to tell what a guide gains there.
     bool can_have_guide() const {
-        if (has_chains()) return false;
-        const std::vector<ParamInfo>& params = integrator_entry(name()).info.params;
-        return !guide && std::any_of(params.begin(), params.end(), [](const ParamInfo& p) {
-            return std::string_view(p.name) == "guide";
-        });
+        return !has_chains() && !guide && integrator_entry(name()).info.has_param("guide");
+    }
+    bool decides_on_specular(const Scene& scene) const {
+        return scene.may_have_chains() &&
+               integrator_entry(name()).info.has_param("specular_connections");
     }
     /// Simulated seconds of pilots on a film of so many pixels, where it has had one already.
     double pilot_seconds(double pixels) const {
@@ -256,6 +257,7 @@ private:
                 untried_.push_back(c.shown);
                 continue;
             }
+            if (is_first && c.decides_on_specular(scene_)) budget_.spend(specular_pilot_seconds());
             c.pilot = pilot_of(small, c);
             if (cheapest_ == 0) {
                 cheapest_ = c.pilot.pass_seconds / (double(width) * double(height));
@@ -272,6 +274,7 @@ private:
         RenderSettings settings = settings_;
         settings.integrator = spec_of(c.in_pilots);
         settings.integrator.guide = c.guide;
+        settings.integrator.specular_pilots = specular_pilots_;
         const MethodPilot pilot = render_pilot(small, settings, number_, drop_);
         number_ += kPilotReplicates;
         budget_.spend(pilot.all_seconds);
@@ -441,6 +444,7 @@ private:
     double pixels_before_ = 0;  ///< Of the film of the last pilots.
     uint64_t number_ = 0;       ///< Of the next pilot.
     bool has_tried_guides_ = false;
+    const std::shared_ptr<SpecularPilots> specular_pilots_ = std::make_shared<SpecularPilots>();
 };
 
 }  // namespace

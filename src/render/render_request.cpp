@@ -71,15 +71,11 @@ RenderSettings settings_of(const RenderRequest& request, IntegratorSpec integrat
 IntegratorSpec choose_integrator(const Scene& scene, const std::string& text) {
     if (text.empty()) return chosen_by_scene(scene);
     IntegratorSpec spec = IntegratorSpec::parse(text);
-    const std::vector<ParamInfo>& params = integrator_entry(spec.name).info.params;
-    const auto takes = [&](const std::string& name) {
-        return std::any_of(params.begin(), params.end(),
-                           [&](const ParamInfo& p) { return p.name == name; });
-    };
+    const PluginInfo& method = integrator_entry(spec.name).info;
     try {
         const IntegratorSpec of_scene = scene_integrator(scene).spec;
         for (const auto& [name, value] : of_scene.params)
-            if (takes(name) && (of_scene.name == spec.name || is_of_the_scene(name)))
+            if (method.has_param(name) && (of_scene.name == spec.name || is_of_the_scene(name)))
                 spec.params.emplace(name, value);
     } catch (const std::exception&) {
         // The scene's integrator does not matter where another one is chosen.

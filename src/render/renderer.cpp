@@ -287,7 +287,7 @@ Renderer::Renderer(const Scene& scene, const RenderSettings& settings,
       workers_(std::make_unique<Workers>(settings.threads)) {
     // Others can be traced again without, or not at all.
     if (integrator_->error_groups() > 0 || !integrator_->keeps_paths() ||
-        integrator_->samples_alone())
+        integrator_->samples_alone(scene))
         settings_.keeps_generations = false;
     check_limits(settings, settings.first_pass);
     check_ranks(settings, *integrator_);

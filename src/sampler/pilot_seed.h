@@ -19,7 +19,7 @@ enum class PilotUse : uint64_t {
     PhotonPaths = 0x6d70737061,     ///< Paths as states of photons.
     SeenExtent = 0x7365656e,        ///< seen_extent()
     Specular = 0x7370656375,        ///< run_specular_pilot()
-    SpecularSeeds = 0x73656564,     ///< Specular::prepare()
+    SpecularSeeds = 0x73656564,     ///< trace_seed_photons()
 };
 
 /// The seed for a use in a rendering or pass with the given seed.

@@ -117,10 +117,7 @@ private:
 };
 
 bool has_roulette_of_joins(const IntegratorSpec& spec) {
-    if (spec.make) return false;
-    const std::vector<ParamInfo>& params = integrator_entry(spec.name).info.params;
-    return std::any_of(params.begin(), params.end(),
-                       [](const ParamInfo& p) { return p.name == std::string_view("roulette"); });
+    return !spec.make && integrator_entry(spec.name).info.has_param("roulette");
 }
 
 void check_pixel(const FilmGeometry& geometry, uint64_t pixel) {
@@ -137,14 +134,14 @@ void sort_by_luminance(Replay& replay) {
 
 }  // namespace
 
-ReplayedPasses replayed_passes(const IntegratorSpec& spec) {
+ReplayedPasses replayed_passes(const IntegratorSpec& spec, const Scene& scene) {
     const std::unique_ptr<Integrator> integrator = make_integrator(spec);
     if (integrator->error_groups() > 0 || !integrator->keeps_paths()) return ReplayedPasses::None;
-    return integrator->samples_alone() ? ReplayedPasses::Any : ReplayedPasses::Whole;
+    return integrator->samples_alone(scene) ? ReplayedPasses::Any : ReplayedPasses::Whole;
 }
 
 Replay replay(const Scene& scene, const ReplayRequest& request) {
-    if (replayed_passes(request.integrator) != ReplayedPasses::Any)
+    if (replayed_passes(request.integrator, scene) != ReplayedPasses::Any)
         throw std::runtime_error(
             fmt::format("paths of {} cannot be traced again without the rest of their pass",
                         request.integrator.name));

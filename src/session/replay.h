@@ -53,7 +53,7 @@ enum class ReplayedPasses {
     Whole,  ///< As a whole, since pixels share data, or paths depend on what was learned: see replay_pass().
     None,  ///< Paths are states of Markov chains, or are not kept.
 };
-ReplayedPasses replayed_passes(const IntegratorSpec& integrator);
+ReplayedPasses replayed_passes(const IntegratorSpec& integrator, const Scene& scene);
 /// Joins pass no Russian roulette before shadow rays. The sum therefore agrees with the image on average, and exactly if
 /// the image was rendered with roulette=0. Throws std::runtime_error unless any pass can be traced again.
 Replay replay(const Scene& scene, const ReplayRequest& request);

@@ -538,7 +538,7 @@ void Api::replay_pixel(const json& body, const Done& done) {
                                         "be looked at: {}",
                                         status.why_look_only));
     const IntegratorSpec integrator = IntegratorSpec::parse(status.request.integrator);
-    switch (replayed_passes(integrator)) {
+    switch (replayed_passes(integrator, *scene)) {
     case ReplayedPasses::None:
         throw ApiError(422, fmt::format("paths of {} cannot be traced again: they are states of "
                                         "Markov chains, or are not kept",

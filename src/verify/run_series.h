@@ -76,6 +76,7 @@ public:
 
     SeriesRenderer(const Scene& scene, const VerifyOptions& options, const Report& progress);
 
+    const Scene& scene() const { return scene_; }
     const TileGrid& grid() const { return grid_; }
     /// δ by path length.
     const std::vector<float>& cut_offs() const { return cut_offs_; }

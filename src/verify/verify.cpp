@@ -36,25 +36,26 @@ IntegratorSpec limited(IntegratorSpec spec, int longest) {
     return spec;
 }
 
-/// References do not use Russian roulette, so that the roulette of methods is verified as well.
-IntegratorSpec without_roulette(IntegratorSpec spec, int longest) {
+/// References use neither Russian roulette nor specular connections, so that these of methods are verified as well.
+IntegratorSpec as_reference(IntegratorSpec spec, int longest) {
     spec.params.emplace("rr_depth", std::to_string(longest + 1));
+    if (!spec.make && integrator_entry(spec.name).info.has_param("specular_connections"))
+        spec.params.emplace("specular_connections", "off");
     return spec;
 }
 
 /// Russian roulette before shadow rays depends on the weighted contribution. Unweighted contributions of a technique
 /// with small weights become rare and unbounded. Therefore techniques are rendered without it. Empty where `spec` has
 /// none, as `path` without specular connections.
-std::optional<IntegratorSpec> without_join_roulette(IntegratorSpec spec) {
-    const auto specular = spec.params.find("specular_connections");
-    if (spec.name == "path" && (specular == spec.params.end() || specular->second == "off"))
-        return {};
-    for (const IntegratorEntry& e : integrator_registry())
-        for (const ParamInfo& p : e.info.params)
-            if (e.info.name == spec.name && p.name == std::string("roulette") &&
-                spec.params.emplace(p.name, "0").second)
-                return spec;
-    return {};
+std::optional<IntegratorSpec> without_join_roulette(IntegratorSpec spec, const Scene& scene) {
+    if (spec.name == "path") {
+        const auto specular = spec.params.find("specular_connections");
+        const bool is_off = specular != spec.params.end() && specular->second == "off";
+        if (is_off || !scene.may_have_chains()) return {};
+    }
+    if (spec.make || !integrator_entry(spec.name).info.has_param("roulette")) return {};
+    if (!spec.params.emplace("roulette", "0").second) return {};
+    return spec;
 }
 
 MethodReport start_report(const IntegratorSpec& spec, const RunSeries& series) {
@@ -128,8 +129,7 @@ public:
           begin_(std::chrono::steady_clock::now()) {
         for (const IntegratorSpec& m : methods) make_integrator(limited(m, options.longest));
         for (const IntegratorSpec& r : options.against)
-            reference_specs_.push_back(
-                without_roulette(limited(r, options.longest), options.longest));
+            reference_specs_.push_back(as_reference(limited(r, options.longest), options.longest));
         renderer.choose_cut_offs(reference_specs_.front());
         // Streams of random numbers: 1 is that of the first reference.
         uint64_t stream = 1;
@@ -140,7 +140,7 @@ public:
         for (const IntegratorSpec& m : methods)
             methods_.push_back(start(limited(m, options.longest)));
         for (const IntegratorSpec& m : methods) {
-            const auto spec = without_join_roulette(limited(m, options.longest));
+            const auto spec = without_join_roulette(limited(m, options.longest), renderer.scene());
             unthinned_.push_back(spec ? std::optional(start(*spec)) : std::nullopt);
         }
         for (size_t i = 1; i < reference_specs_.size(); ++i)

@@ -78,15 +78,17 @@ TEST_P(ReplayOf, SumsToThePixel) {
     }
 }
 
-/// All integrators whose samples need no others, without roulette of joins where they have it.
+/// All integrators whose samples need no others, without roulette of joins and specular connections where they have them.
 std::vector<std::string> methods_alone() {
+    const Scene scene = room_with_ball();
     std::vector<std::string> methods;
     for (const IntegratorEntry& e : integrator_registry()) {
         IntegratorSpec spec{e.info.name, {}};
-        if (replayed_passes(spec) != ReplayedPasses::Any) continue;
-        for (const ParamInfo& p : e.info.params)
-            if (p.name == std::string("roulette")) spec.params["roulette"] = "0";
-        methods.push_back(spec.to_string());
+        for (const auto& [name, value] :
+             {std::pair("roulette", "0"), std::pair("specular_connections", "off")})
+            if (e.info.has_param(name)) spec.params[name] = value;
+        if (replayed_passes(spec, scene) == ReplayedPasses::Any)
+            methods.push_back(spec.to_string());
     }
     return methods;
 }
@@ -105,13 +107,13 @@ public:
         return path_->counts(scene, light_paths);
     }
     uint64_t light_paths(const Scene&) const override { return 0; }
-    bool samples_alone() const override { return samples_alone_; }
+    bool samples_alone(const Scene&) const override { return samples_alone_; }
     Estimator estimator() const override { return Estimator::Unbiased; }
     void save(LearnedState&) const override {}
     void load(LearnedState&) override {}
 
 private:
-    std::unique_ptr<Integrator> path_ = make_integrator(IntegratorSpec::parse("path"));
+    std::unique_ptr<Integrator> path_ = make_integrator(IntegratorSpec::parse("path:specular_connections=off"));
     bool samples_alone_;
 };
 
@@ -121,13 +123,13 @@ TEST(Replay, AsksTheIntegrator) {
     ReplayRequest request;
     request.pixel = 27;
     request.passes = 4;
-    request.integrator = IntegratorSpec::parse("path");
+    request.integrator = IntegratorSpec::parse("path:specular_connections=off");
     const Replay expected = replay(scene, request);
     for (const bool alone : {true, false}) {
         request.integrator = {alone ? "own" : "path", {}, [=](const auto&) {
                                   return std::make_unique<OwnIntegrator>(alone);
                               }};
-        EXPECT_EQ(replayed_passes(request.integrator),
+        EXPECT_EQ(replayed_passes(request.integrator, scene),
                   alone ? ReplayedPasses::Any : ReplayedPasses::Whole);
         if (alone)
             EXPECT_EQ(replay(scene, request).sum, expected.sum);
@@ -159,7 +161,7 @@ TEST(Replay, TracesAllLightPaths) {
     const Scene scene = room_with_ball();
     for (const int light_paths : {40, 64, 150}) {
         RenderSettings settings =
-            settings_of("bdpt:roulette=0,light_paths=" + std::to_string(light_paths));
+            settings_of("bdpt:roulette=0,specular_connections=off,light_paths=" + std::to_string(light_paths));
         settings.seed = 0;
         settings.spp = 1;
         Renderer renderer(scene, settings);
@@ -181,7 +183,7 @@ TEST(Replay, TracesAllLightPaths) {
 TEST(Replay, EndsAtItsLimits) {
     const Scene scene = room_with_ball();
     ReplayRequest request;
-    request.integrator = IntegratorSpec::parse("bdpt");
+    request.integrator = IntegratorSpec::parse("bdpt:specular_connections=off");
     request.pixel = 27;
     request.passes = 1000;
     request.most_paths = 10;
@@ -195,15 +197,23 @@ TEST(Replay, EndsAtItsLimits) {
 }
 
 TEST(Replay, KnowsWhichPassesCanBeTraced) {
-    const auto passes = [](const char* text) {
-        return replayed_passes(IntegratorSpec::parse(text));
+    const Scene mirror = room_with_ball(),
+                rough = build(sensor("0,0,3.5", "0,0,0", 8) + room() + area_lamp());
+    const auto passes = [&](const char* text, const Scene& scene) {
+        return replayed_passes(IntegratorSpec::parse(text), scene);
     };
-    for (const char* alone : {"path", "bdpt:roulette=0", "light", "path:guide=off"})
-        EXPECT_EQ(passes(alone), ReplayedPasses::Any) << alone;
+    for (const char* alone : {"path:specular_connections=off", "light", "path:guide=off",
+                              "bdpt:roulette=0,specular_connections=off"})
+        EXPECT_EQ(passes(alone, rough), ReplayedPasses::Any) << alone;
     for (const char* shared : {"vcm", "upg", "pcbpt", "path:guide=on"})
-        EXPECT_EQ(passes(shared), ReplayedPasses::Whole) << shared;
+        EXPECT_EQ(passes(shared, rough), ReplayedPasses::Whole) << shared;
     for (const char* none : {"mlt", "pssmlt", "pm"})
-        EXPECT_EQ(passes(none), ReplayedPasses::None) << none;
+        EXPECT_EQ(passes(none, rough), ReplayedPasses::None) << none;
+    // Specular connections are prepared where there is something smooth.
+    for (const char* method : {"path", "bdpt", "path:specular_connections=on"}) {
+        EXPECT_EQ(passes(method, rough), ReplayedPasses::Any) << method;
+        EXPECT_EQ(passes(method, mirror), ReplayedPasses::Whole) << method;
+    }
 }
 
 class ReplayOfPass : public ::testing::TestWithParam<const char*> {};
