@@ -5,6 +5,7 @@
 
 #include <unistd.h>
 
+#include "system/child_process.h"
 #include "system/output_file.h"
 
 namespace etendue {
@@ -14,7 +15,9 @@ namespace {
 std::atomic<bool> stop{false}, drop{false}, is_graceful{false}, ends_at_once{false};
 std::atomic<unsigned> grace_seconds{0};
 
-extern "C" void on_interrupt(int) {
+// Temporary folders are removed by the thread that has made them.
+extern "C" void on_interrupt(int signal) {
+    if (HeldSignals::pass_on(signal)) return;
     if (ends_at_once) end_at_once(130);
     if (!stop.exchange(true)) {
         if (!is_graceful) return;
@@ -27,6 +30,7 @@ extern "C" void on_interrupt(int) {
     }
 }
 extern "C" void on_end(int signal) {
+    if (HeldSignals::pass_on(signal)) return;
     if (signal == SIGINT) end_at_once(130);
     remove_temporary_files();
     std::signal(signal, SIG_DFL);

@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cstdlib>
@@ -23,6 +24,26 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kEnding[] = {SIGINT, SIGTERM, SIGHUP};
+
+/// The thread of a HeldSignals. A global, since handlers have no argument through which to reach it.
+class Holder {
+public:
+    /// False if there is one already.
+    bool take() {
+        pid_t none = 0;
+        return thread_.compare_exchange_strong(none, ::gettid());
+    }
+    void give_up() { thread_ = 0; }
+    /// Fails where the thread has given up or is this one, which does not hold signals that it handles.
+    bool send(int signal) const noexcept {
+        const pid_t thread = thread_;
+        return thread != 0 && thread != ::gettid() && ::tgkill(::getpid(), thread, signal) == 0;
+    }
+
+private:
+    std::atomic<pid_t> thread_{0};
+};
+Holder holder;
 /// Of a child whose program could not be started, beside the number of the error in a pipe.
 constexpr int kNotStarted = 127;
 
@@ -84,10 +105,16 @@ HeldSignals::HeldSignals() {
     for (const int signal : kEnding)
         if (!is_ignored(signal)) ::sigaddset(&held, signal);
     ::pthread_sigmask(SIG_BLOCK, &held, &before_);
+    is_first_ = holder.take();
 }
 
 HeldSignals::~HeldSignals() {
+    if (is_first_) holder.give_up();
     ::pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+}
+
+bool HeldSignals::pass_on(int signal) noexcept {
+    return holder.send(signal);
 }
 
 bool HeldSignals::has_one() {
@@ -140,8 +167,8 @@ int run_child(std::vector<std::string> words, const std::string& log) {
     {
         const Descriptor writing(ends[1]);
         const pid_t self = ::getpid();
-        // Where it is ignored, as by what started the program, there would be nothing to wait for.
-        ::signal(SIGCHLD, SIG_DFL);
+        // Where it is ignored, as by what started the program, there would be nothing to wait for. A handler is the host's.
+        if (is_ignored(SIGCHLD)) ::signal(SIGCHLD, SIG_DFL);
         child = ::fork();
         if (child == 0) become(argv.data(), output.get(), writing.get(), self);
         if (child < 0)

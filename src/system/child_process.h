@@ -18,9 +18,14 @@ public:
     HeldSignals& operator=(const HeldSignals&) = delete;
     /// Whether one of them has arrived.
     static bool has_one();
+    /// For handlers, which run in threads that do not hold the signal: sends it to the thread that does. False if there is
+    /// none.
+    static bool pass_on(int signal) noexcept;
 
 private:
     sigset_t before_;
+    bool is_first_ =
+        false;  ///< Of those that live at the same time; its thread receives what is passed on.
 };
 
 /// A new folder of this user alone among the temporary files of the system, which is deleted with the object.

@@ -279,6 +279,27 @@ TEST_F(StageTest, SignalsLeaveNothingBehind) {
     }
 }
 
+// Other threads, which do not hold signals, exist after the first comparison.
+TEST_F(StageTest, SignalsBetweenComparisonsLeaveNothingBehind) {
+    const std::string begun = folder.path() / "begun";
+    python("touch " + begun + "; exec sleep 60");
+    for (const int signal : {SIGINT, SIGTERM}) {
+        fs::remove(begun);
+        const Program program(ETENDUE_PROGRAM,
+                              {"compare",
+                               (fs::path(ETENDUE_SOURCE_DIR) / "scenes/cornell.xml").string(),
+                               folder.path() / "stage.usda", "--methods", "path", "--spp", "1",
+                               "--reference-spp", "1", "--resolution", "16x16",
+                               "--techniques-max-depth", "0", "--report", folder.path() / "report"},
+                              folder.path());
+        while (!fs::exists(begun)) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        program.send(signal);
+        const ProgramResult r = program.wait();
+        EXPECT_TRUE(signal == SIGINT ? r.status == 130 : r.signal == SIGTERM) << r.errors;
+        expect_no_temporary_files();
+    }
+}
+
 TEST_F(ConvertTest, RefusesOutputsThatWouldDoHarm) {
     const std::string scene =
         write("scene.xml", R"(<scene version="3.0.0"><emitter type="constant"/>

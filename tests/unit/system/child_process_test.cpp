@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -56,6 +57,46 @@ TEST(ChildProcess, EndsWithASignalThatIsHeld) {
         EXPECT_EQ(arrived, 0);
     }
     EXPECT_EQ(arrived, 1);
+    std::signal(SIGTERM, old);
+}
+
+void count_child(int) {}
+
+TEST(ChildProcess, LeavesTheHandlerOfItsHost) {
+    const TemporaryFolder folder;
+    const auto old = std::signal(SIGCHLD, count_child);
+    EXPECT_EQ(run_child({find_program("true")}, folder.path() / "log"), 0);
+    EXPECT_EQ(std::signal(SIGCHLD, SIG_IGN), count_child);
+    EXPECT_EQ(run_child({find_program("false")}, folder.path() / "log"), 1);
+    std::signal(SIGCHLD, old);
+}
+
+// As in a program whose other threads do not hold it.
+TEST(ChildProcess, EndsWithASignalThatAnotherThreadPassesOn) {
+    const TemporaryFolder folder;
+    static std::atomic<int> arrived{0};
+    const auto old = std::signal(SIGTERM, [](int signal) {
+        if (!HeldSignals::pass_on(signal)) ++arrived;
+    });
+    std::raise(SIGTERM);
+    EXPECT_EQ(arrived, 1);
+    std::atomic<bool> has_begun{false}, has_passed{false};
+    std::thread other([&] {
+        while (!has_begun) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        std::raise(SIGTERM);
+        EXPECT_EQ(arrived, 1);
+        has_passed = true;
+    });
+    {
+        const HeldSignals held;
+        has_begun = true;
+        EXPECT_THROW(run_child({find_program("sleep"), "60"}, folder.path() / "log"),
+                     std::runtime_error);
+        while (!has_passed) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        EXPECT_EQ(arrived, 1);
+    }
+    EXPECT_EQ(arrived, 2);
+    other.join();
     std::signal(SIGTERM, old);
 }
 
