@@ -145,8 +145,8 @@ public:
     }
     /// Whether tell() does anything.
     bool needs_joins() const { return to_.techniques || to_.observer || !to_.shown.contains_all(); }
-    /// Adds the splats that wait; to be called at the end. Not by the destructor, since there may be no memory for a splat. What
-    /// then still waits is dropped with the pass.
+    /// Adds the splats that wait; to be called at the end. Not by the destructor, since there may be no memory for a splat.
+    /// What then still waits is dropped with the pass.
     void flush() {
         const size_t count = std::exchange(waiting_, 0);
         for (size_t i = 0; i < count; ++i) to_.film.add_splat(queue_[i].film, queue_[i].value);
@@ -698,7 +698,15 @@ void Renderer::trace_again(uint32_t pass, std::shared_ptr<const Generation> gene
                            const std::atomic<bool>& drop) {
     load_learned_state(generation->learned);
     replayed_ = std::move(generation);
-    workers_->arena.execute([&] { Pass(*this, pass, drop).trace_shared(); });
+    // Samples that share no light paths have their own.
+    const bool splats_samples = light_paths_ > 0 && integrator_->light_path_memory() == 0;
+    workers_->arena.execute([&] {
+        Pass again(*this, pass, drop);
+        if (settings_.observer && splats_samples)
+            again.trace();
+        else
+            again.trace_shared();
+    });
 }
 
 void Renderer::gather() {

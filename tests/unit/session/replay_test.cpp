@@ -264,6 +264,45 @@ INSTANTIATE_TEST_SUITE_P(Methods, ReplayOfPass,
                                            "sppm:radius=0.3", "path:guide=on", "bdpt:guide=on",
                                            "path:specular_connections=auto"));
 
+class SplatsOfPass : public ::testing::TestWithParam<const char*> {};
+
+/// With the splats, the paths sum to all that the pass has added to the pixel.
+TEST_P(SplatsOfPass, SumToThePass) {
+    const Scene scene = room_with_ball();
+    RenderSettings settings = settings_of(GetParam());
+    settings.keeps_generations = true;
+    Renderer renderer(scene, settings);
+    const auto image_after = [&](uint64_t spp) {
+        RenderLimits limits;
+        limits.spp = spp;
+        renderer.run(
+            limits, [](const Progress&) {}, std::atomic<bool>(false));
+        return renderer.film().image();
+    };
+    constexpr uint32_t kPass = 4;
+    const std::vector<Rgb> before = image_after(kPass), after = image_after(kPass + 1);
+    const auto shared = std::shared_ptr<const Scene>(std::shared_ptr<void>(), &scene);
+    const PassOfRun of{shared, renderer.settings(), kPass, renderer.generation_of(kPass)};
+    size_t splats = 0;
+    for (uint64_t p = 0; p < before.size(); p += 5) {
+        const Replay all = replay_pass(of, p, 1000000, std::atomic<bool>(false));
+        EXPECT_EQ(all.light_paths, renderer.light_paths());
+        const Rgb listed = sum_of(all.paths);
+        for (int c = 0; c < 3; ++c) {
+            const float added = after[p][c] * (kPass + 1) - before[p][c] * kPass;
+            EXPECT_NEAR(listed[c], added, 1e-4f * (1 + after[p][c] * (kPass + 1))) << p;
+        }
+        splats += size_t(std::count_if(all.paths.begin(), all.paths.end(),
+                                       [](const auto& q) { return q.technique.t <= 1; }));
+    }
+    EXPECT_GT(splats, 3u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, SplatsOfPass,
+                         ::testing::Values("vcm:radius=0.3", "pcbpt", "bdpt:guide=on",
+                                           "bdpt:guide=on,light_paths=100", "light:guide=on",
+                                           "bdpt:specular_connections=on"));
+
 class LastReplayOf : public ::testing::TestWithParam<const char*> {};
 
 /// Contributions with t ≥ 2 sum to the difference of the pixel's sums after and before the last pass.
