@@ -98,10 +98,16 @@ void replace_openpbr(PlainScene& s, int index) {
         SceneObject& o = s.object(index);
         const bool is_mixed_glass =
             !is_zero(o, "transmission_weight") && has(o, "transmission_color");
-        s.stand_in(
-            o, "principled",
-            "white surfaces reflect 0.70 to 1.05 of the light instead of all of it, and colours "
-            "of the specular reflection, the coat and the fuzz are left out");
+        const bool affects_below =
+            !is_zero(o, "coat_weight") &&
+            (number(o, "coat_affect_ior", 1) != 0 || number(o, "coat_affect_roughness", 1) != 0);
+        s.stand_in(o, "principled",
+                   std::string("white surfaces reflect 0.70 to 1.05 of the light instead of all of "
+                               "it, and colours of the specular reflection, the coat and the fuzz "
+                               "are left out") +
+                       (affects_below ? "; what lies below the coat is as without it, as if "
+                                        "\"coat_affect_ior\" and \"coat_affect_roughness\" were 0"
+                                      : ""));
         // The base colour is that of glass as well.
         if (is_mixed_glass && !has_texture(o, "transmission_weight") &&
             number(o, "transmission_weight", 0) == 1 && number(o, "base_metalness", 0) == 0 &&

@@ -440,6 +440,11 @@ TEST(PlainMitsuba, EveryApproximationIsReported) {
          "\"specular_weight\" and \"specular_color\""},
         {R"(<bsdf type="openpbr"><float name="coat_weight" value="0.5"/></bsdf>)",
          "\"principled\" stands in for it; white surfaces reflect 0.70 to 1.05"},
+        {R"(<bsdf type="openpbr"><float name="coat_weight" value="0.5"/></bsdf>)",
+         "as if \"coat_affect_ior\" and \"coat_affect_roughness\" were 0"},
+        {R"(<bsdf type="openpbr"><float name="coat_weight" value="0.5"/>
+            <float name="coat_affect_ior" value="0"/></bsdf>)",
+         "\"coat_affect_roughness\" were 0"},
         {R"(<bsdf type="mixturebsdf"><string name="weights" value="0.9 0.4"/>
             <boolean name="ensure_energy_conservation" value="false"/><bsdf type="diffuse"/>
             <bsdf type="diffuse"/></bsdf>)",
@@ -453,6 +458,15 @@ TEST(PlainMitsuba, EveryApproximationIsReported) {
     for (const auto& [inside, expected] : cases)
         EXPECT_NE(warning_of(inside).find(expected), std::string::npos) << expected << "\n"
                                                                         << warning_of(inside);
+}
+
+// Of a coat that changes nothing below it, nothing is lost; nor without a coat.
+TEST(PlainMitsuba, CoatsThatAffectNothingAreNotReported) {
+    for (const char* inside : {R"(<bsdf type="openpbr"><float name="coat_weight" value="0.5"/>
+             <float name="coat_affect_ior" value="0"/>
+             <float name="coat_affect_roughness" value="0"/></bsdf>)",
+                               R"(<bsdf type="openpbr"/>)"})
+        EXPECT_EQ(warning_of(inside).find("coat_affect"), std::string::npos) << inside;
 }
 
 /// Albedo for light from a direction, by the midpoint rule, of the diffuse part of the only shape's material.
