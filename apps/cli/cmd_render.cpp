@@ -253,6 +253,9 @@ void RenderCommand::check_options() const {
     } catch (const std::runtime_error& e) {
         throw UsageError(fmt::format("--aov: {}", e.what()));
     }
+    if (!aovs.empty() && image_extension(output) != ".exr")
+        throw UsageError(
+            fmt::format("--aov: {} would have no layers; an .exr file has them", output));
 }
 
 void RenderCommand::check_outputs() const {

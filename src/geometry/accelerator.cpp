@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstddef>
+#include <map>
 #include <stdexcept>
 #include <string>
 
@@ -179,7 +180,9 @@ struct Accelerator::Impl {
     RTCDevice device = nullptr;
     std::shared_ptr<Part> part;  ///< With the shapes and instances of the scene itself.
     RTCScene top = nullptr;
-    std::vector<std::shared_ptr<const Part>> groups, earlier_groups;
+    std::vector<std::shared_ptr<const Part>> groups;
+    /// Those of an earlier accelerator, by their shapes.
+    std::map<std::vector<const Shape*>, std::shared_ptr<const Part>> earlier_groups;
     std::vector<std::pair<uint32_t, uint32_t>> group_shapes;  ///< Indices [first, second).
     /// By geometry id of the top-level scene: index of the shape, or of the instance.
     std::vector<uint32_t> shape_of_geom;
@@ -245,7 +248,8 @@ Accelerator::Accelerator(const AcceleratorOptions& options)
 Accelerator::Accelerator(const AcceleratorOptions& options, const Accelerator& earlier)
     : impl_(std::make_shared<Impl>(options, earlier.impl_->shared)) {
     if (options.is_watertight == earlier.impl_->options.is_watertight)
-        impl_->earlier_groups = earlier.impl_->groups;
+        for (const auto& group : earlier.impl_->groups)
+            impl_->earlier_groups.emplace(group->shapes, group);
 }
 
 uint32_t Accelerator::add_shape(const Shape& shape) {
@@ -260,10 +264,9 @@ uint32_t Accelerator::add_group(const std::vector<const Shape*>& shapes) {
     const uint32_t first = impl_->shape_count;
     impl_->shape_count += uint32_t(shapes.size());
     impl_->group_shapes.emplace_back(first, impl_->shape_count);
-    const auto known = std::find_if(impl_->earlier_groups.begin(), impl_->earlier_groups.end(),
-                                    [&](const auto& group) { return group->shapes == shapes; });
+    const auto known = impl_->earlier_groups.find(shapes);
     if (known != impl_->earlier_groups.end()) {
-        impl_->groups.push_back(*known);
+        impl_->groups.push_back(known->second);
     } else {
         const int64_t before = impl_->shared->memory.bytes;
         auto group = std::make_shared<Part>(impl_->shared, impl_->options.is_watertight);

@@ -285,6 +285,9 @@ TEST_F(ProgramTest, RefusesBadCommandLines) {
     expect_refusal({"render", s, "--threads", "-2"}, "threads");
     expect_refusal({"render", s, "--sampler", "sobl"}, "sampler");
     expect_refusal({"render", s, "--aov", "albdo"}, "albdo");
+    for (const char* output : {"a.pfm", "a.hdr", "a.png"})
+        expect_refusal({"render", s, "--aov", "albedo", "-o", folder.path() / output},
+                       "would have no layers");
     expect_refusal({"render", s, "--preview", "tef"}, "preview");
     expect_refusal({"render", s, "--colour"}, "--colour");
     expect_refusal({"render", (folder.path() / "no_such.xml").string()}, "no_such.xml");
