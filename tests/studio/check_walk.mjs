@@ -42,7 +42,18 @@ async function walkPart(browser) {
     check(distance(start, [0, -1.5, 0]) < 1e-3, `the view begins at the camera: ${start}`);
     await browser.evaluate(press('walk'));
     check(await browser.evaluate("document.activeElement.id === 'space' && document.getElementById('space-label').textContent.includes('scene units a second')"), 'walking begins, and says how fast');
+    check(await browser.evaluate("document.getElementById('spoken').textContent.includes('scene units a second')"), 'to screen readers, too');
     await browser.screenshot('walk-1-start');
+    // Shift counts as well where it is pressed after the other key.
+    const send = (type, event) => browser.send('Input.dispatchKeyEvent', {type, ...event});
+    const shift = {key: 'Shift', code: 'ShiftLeft'}, back = {key: 's', code: 'KeyS'};
+    await send('rawKeyDown', back);
+    await send('rawKeyDown', {...shift, modifiers: 8});
+    check(await browser.evaluate('studio.space().runs && studio.space().pressed.size === 1'), 'Shift makes the walk faster while it lasts');
+    await send('keyUp', shift);
+    check(await browser.evaluate('!studio.space().runs'), 'and slower when it is released');
+    await send('keyUp', back);
+    await browser.evaluate('studio.space().lookAsCamera()');
     await hold(browser, 'KeyW', 'studio.space().eye()[1] > 3', 'through the door');
     const there = await eye(browser);
     check(Math.abs(there[0]) < 1e-3 && Math.abs(there[2]) < 1e-3, `straight on: ${there}`);

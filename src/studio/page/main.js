@@ -701,6 +701,7 @@ function showPane(name) {
         space = new Space(at('space'), at('space-tools'), at('space-label'), server, state.scene);
         editor = new PathEditor(at('editor'), space, server, {
             pixel: () => ({x: view.cursor[0], y: view.cursor[1]}), start: begin, runs: () => runs, fail: text => banner('editor', text, 'Dismiss', () => banner('editor', ''))});
+        space.tell.say = text => { at('spoken').textContent = text; };
         space.tell.render = camera => { showPane('image'); report(changeView({camera})); };
         inspector = new Inspector(at('inspector'), space, server, editor);
         inspector.setPixel(view.cursor[0], view.cursor[1], shown[0].run);

@@ -143,9 +143,9 @@ export class Space {
         /**
          * Called with a point under the pointer.
          * @type {{click: (x: number, y: number) => void, drag: (x: number, y: number) => boolean, press: (x: number, y: number) => boolean, release: () => void,
-         *         render: (camera: {eye: Vec, target: Vec, up: Vec} | null) => void}}
+         *         render: (camera: {eye: Vec, target: Vec, up: Vec} | null) => void, say: (text: string) => void}}
          */
-        this.tell = {click: () => {}, drag: () => false, press: () => false, release: () => {}, render: () => {}};
+        this.tell = {click: () => {}, drag: () => false, press: () => false, release: () => {}, render: () => {}, say: () => {}};
         this.cutInput = element('input', {type: 'range', id: 'cut', min: 0, max: 1, step: 0.005, value: 0, oninput: () => { this.cut = Number(this.cutInput.value); this.redraw(); }});
         this.walkButton = element('button', {type: 'button', id: 'walk', textContent: 'Walk', 'aria-pressed': 'false',
             title: 'Drag to look around; W A S D to go, E and Q or R and F to rise and sink, with Shift faster; the wheel changes the speed', onclick: () => { this.walk(!this.isWalking); canvas.focus(); }});
@@ -453,6 +453,7 @@ export class Space {
     }
     tellSpeed() {
         this.label.textContent = this.isWalking ? `walking: ${significant(this.speed * this.radius, 2)} scene units a second` : '';
+        this.tell.say(this.label.textContent || 'walking ends');
     }
     /**
      * Moves the eye for some seconds in the directions of the pressed keys.
@@ -479,10 +480,10 @@ export class Space {
     listenToKeys() {
         const canvas = this.canvas;
         canvas.addEventListener('keydown', e => {
+            this.runs = e.shiftKey;
             if (!this.isWalking || e.ctrlKey || e.altKey || e.metaKey || !(e.code in kSteps)) return;
             e.preventDefault();
             e.stopPropagation();
-            this.runs = e.shiftKey;
             if (e.repeat || this.pressed.has(e.code)) return;
             const isFirst = this.pressed.size === 0, kTap = 1 / 60;
             this.pressed.add(e.code);
