@@ -59,8 +59,8 @@ private:
 class Material {
 public:
     virtual ~Material() = default;
-    /// Appends this material's lobes at `point` to `list`, scaled by `weight` (which may exceed 1), in the shading frame `frame` (which a
-    /// two-sided material turns toward wo).
+    /// Appends this material's lobes at `point` to `list`, scaled by `weight` (which may exceed 1), in the shading frame
+    /// `frame` (which a two-sided material turns toward wo).
     virtual void append(const SurfacePoint& point, const Frame& frame, float weight,
                         class ComponentList& list) const = 0;
     /// Probability that a ray meets the surface: 1 unless masked, 0 for `null`.

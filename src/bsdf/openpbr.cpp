@@ -35,9 +35,9 @@
 //   - The coat is isotropic and does not darken its base by reflections between them, and there is no subsurface scattering,
 //     dispersion, thin film or emission.
 // A thin-walled material, and one with transmission, has its opaque part on both sides; other ones reflect on the front alone.
-// The albedo of white surfaces is 1 within 0.5 %, for roughnesses from 0 to 1 and anisotropies up to 0.95, within 0.3 % with coat and fuzz together, and
-// within 1 % where the roughness of coat or fuzz is a texture. Within 6° of the horizon it is 1 within 1.4 % where the
-// roughness of the facets is a texture.
+// The albedo of white surfaces is 1 within 0.5 %, for roughnesses from 0 to 1 and anisotropies up to 0.95, within 0.3 % with
+// coat and fuzz together, and within 1 % where the roughness of coat or fuzz is a texture. Within 6° of the horizon it is 1
+// within 1.4 % where the roughness of the facets is a texture.
 
 #include "bsdf/openpbr.h"
 

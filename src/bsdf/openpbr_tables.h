@@ -309,7 +309,8 @@ private:
     OpenPbrSlab slab_;
     OpenPbrLayers layers_;
     int n_alpha_, n_eta_, n_phi_, n_blocks_;
-    /// Rows are equidistant in atan(stretch tan φ), halfway to the space where the facets are round: albedos are nearly linear there.
+    /// Rows are equidistant in atan(stretch tan φ), halfway to the space where the facets are round: albedos are nearly linear
+    /// there.
     float stretch_ = 1;
     /// The azimuths of the rows, and shares of these in means.
     std::vector<double> azimuths_{0}, azimuth_weights_{1};

@@ -20,8 +20,8 @@ struct PlasticParams {
     };
     /// Colours at `at`. The diffuse one includes interreflection below the coat, but not the two transmittances:
     ///     ρ / (η² (1 − ρ' F_int)),
-    /// where F_int is the coat's reflectance for diffuse light from below, see reflectance_below_coat(). With `nonlinear` ρ' = ρ, which saturates the
-    /// colour; otherwise ρ' = 1, which keeps the hue of textures.
+    /// where F_int is the coat's reflectance for diffuse light from below, see reflectance_below_coat(). With `nonlinear` ρ' =
+    /// ρ, which saturates the colour; otherwise ρ' = 1, which keeps the hue of textures.
     Colors eval(const TexturePoint& at, float F_int) const;
     Rgb mean_albedo() const;
 

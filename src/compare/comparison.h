@@ -90,8 +90,8 @@ struct Comparison {
 using CompareProgress = std::function<void(const std::string& text)>;
 
 /// Renders the methods and evaluates them. If `interrupted` is set, evaluates the images rendered until then. A method
-/// whose rendering fails does not affect the others. Of images of other programs, memory, rays and techniques are unknown. Throws std::runtime_error where a method or its parameters do not
-/// exist, or all methods fail.
+/// whose rendering fails does not affect the others. Of images of other programs, memory, rays and techniques are unknown.
+/// Throws std::runtime_error where a method or its parameters do not exist, or all methods fail.
 Comparison compare(const Scene& scene, const Reference& reference, const CompareSettings& settings,
                    const CompareProgress& progress, const std::atomic<bool>& interrupted);
 

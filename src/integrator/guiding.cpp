@@ -314,8 +314,8 @@ void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& recor
     guide.set_emission(std::move(by_emitter));
 }
 
-/// The selection of emitters by next events is learned from the light that they bring. Where it gains little, that of everywhere
-/// stays, which takes less time.
+/// The selection of emitters by next events is learned from the light that they bring. Where it gains little, that of
+/// everywhere stays, which takes less time.
 void learn_lights(const Scene& scene, const std::vector<EmissionRecord>& records, Guide& guide) {
     constexpr float kLeastGain = 0.1f;  // in nats
     if (!scene.has_emitter_choice()) return;

@@ -76,8 +76,8 @@ public:
 
     /// Follows the ray along `w` through all events; false where one of them is not met.
     bool follow(Vec3d w, const ChainEvents& events);
-    /// The direction near `w` whose ray passes through the lamp's point, behind the events; the tracer has followed it then. It is
-    /// a function of its arguments: found by one seed, it is found again by the same one. `ray`: the ray along `w` after its
+    /// The direction near `w` whose ray passes through the lamp's point, behind the events; the tracer has followed it then. It
+    /// is a function of its arguments: found by one seed, it is found again by the same one. `ray`: the ray along `w` after its
     /// events.
     std::optional<Vec3d> solve(Vec3d w, const ChainEvents& events, const ChainRay& ray,
                                const LampPoint& lamp);

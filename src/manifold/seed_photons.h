@@ -1,6 +1,6 @@
 #pragma once
-// Places at which the light of lamps arrives by delta events alone. They tell where the chains begin that an eye vertex near them
-// needs: in light that is focused most photons arrive by the chains that carry most of it.
+// Places at which the light of lamps arrives by delta events alone. They tell where the chains begin that an eye vertex near
+// them needs: in light that is focused most photons arrive by the chains that carry most of it.
 
 #include <span>
 #include <vector>

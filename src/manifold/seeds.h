@@ -26,11 +26,12 @@ public:
                const SeedPhotons& photons, ChainTracer& tracer, RenderStats& stats);
 
     /// A walk leaves the eye vertex and goes on by delta events: toward where a photon near it had its last event, toward a
-    /// random point of a shape that has delta events alone, or in a direction of its own BSDF, without guide. Of the chains that lead from the eye vertex to a surface on this walk, one is chosen uniformly
-    /// among those from whose last surface the ray leaves on the side of the lamp's point, which that surface sees. Every
-    /// condition on a seed also holds for the seeds near a solution, and directions of the BSDF reach all solutions that
-    /// contribute. So each solution that is not degenerate has a positive probability. Empty where the walk has no such chain, or
-    /// the seed is known to have other events than `only`.
+    /// random point of a shape that has delta events alone, or in a direction of its own BSDF, without guide. Of the chains
+    /// that lead from the eye vertex to a surface on this walk, one is chosen uniformly among those from whose last surface the
+    /// ray leaves on the side of the lamp's point, which that surface sees. Every condition on a seed also holds for the seeds
+    /// near a solution, and directions of the BSDF reach all solutions that contribute. So each solution that is not degenerate
+    /// has a positive probability. Empty where the walk has no such chain, or the seed is known to have other events than
+    /// `only`.
     std::optional<ChainSeed> draw(Sampler& sampler, const ChainEvents* only = nullptr);
 
 private:

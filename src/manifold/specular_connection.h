@@ -17,8 +17,8 @@ namespace etendue {
 /// P over Π P_j and the spread, as weights take it: in several scenes, where half of the seeds went toward clear shapes, the
 /// mean was 0.1 to 0.6, and a number of trials with the mean 1/P has the variance of P/2 samples.
 inline constexpr double kSolutionShare = 0.15;
-/// Where a chain spreads directions more than a straight ray of its length does, few seeds lead to each solution. `jacobian`: as
-/// Passing::jacobian(); at infinity `length` is 1.
+/// Where a chain spreads directions more than a straight ray of its length does, few seeds lead to each solution. `jacobian`:
+/// as Passing::jacobian(); at infinity `length` is 1.
 inline double spread(double jacobian, double length) {
     return std::fmin(1, jacobian * sqr(length));
 }
@@ -33,8 +33,8 @@ struct SpecularLimits {
     const SeedPhotons* photons = nullptr;
 };
 
-/// Whether paths whose eye path begins with z_0 … z_{t-1}, and goes on from there by delta events to a lamp, are made by hits alone
-/// (and by light paths that hit the lens) if there are no specular connections.
+/// Whether paths whose eye path begins with z_0 … z_{t-1}, and goes on from there by delta events to a lamp, are made by hits
+/// alone (and by light paths that hit the lens) if there are no specular connections.
 bool is_left_to_hits(const SubPath& z, int t, const TechniqueCounts& counts);
 
 /// X(s,t) for a random s. The contribution includes visibility and the number of trials. If the workspace is observed,

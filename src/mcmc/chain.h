@@ -57,7 +57,8 @@ public:
     void start(const Find& find, const ChainContext& c);
     void copy(const Chain& from);
 
-    /// Makes `count` steps, whose random numbers are functions of `key` and the number of the step. Adds the states with the factors given above, times `scale`. Adds what large steps have found to `finds`, if it is given.
+    /// Makes `count` steps, whose random numbers are functions of `key` and the number of the step. Adds the states with the
+    /// factors given above, times `scale`. Adds what large steps have found to `finds`, if it is given.
     void advance(const ChainTerms& terms, double b, double scale, uint64_t key, uint64_t count,
                  const ChainContext& c, StateSink& states, ChainStats& stats,
                  std::vector<Find>* finds = nullptr);

@@ -191,8 +191,8 @@ void GltfReader::read_sheen(const JsonValue& cloth, int surface) {
                cloth["sheenRoughnessTexture"], "opacity");
 }
 
-/// The roughness α along the bitangent, and α + (1 − α) strength² along the tangent, by their ratio and their mean square. The ratio is
-/// a number; where a texture has the roughness, its texels are taken to be kTexel.
+/// The roughness α along the bitangent, and α + (1 − α) strength² along the tangent, by their ratio and their mean square. The
+/// ratio is a number; where a texture has the roughness, its texels are taken to be kTexel.
 void GltfReader::read_anisotropy(const JsonValue& brushed, int surface, double roughness,
                                  const JsonValue& texture) {
     constexpr double kTexel = 0.5;

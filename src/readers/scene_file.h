@@ -20,8 +20,8 @@ bool is_scene_file_name(const std::string& file);
 /// Throws std::runtime_error where there is no such file.
 void check_scene_file(const std::string& file);
 
-/// Reads a scene file with the reader of its extension, also behind ".gz"; stages of USD by read_usd(). Throws std::runtime_error where there is no
-/// such file or no such reader, and SceneError where the contents are invalid.
+/// Reads a scene file with the reader of its extension, also behind ".gz"; stages of USD by read_usd(). Throws
+/// std::runtime_error where there is no such file or no such reader, and SceneError where the contents are invalid.
 SceneDescription read_scene_file(const std::string& file, const ReadOptions& options = {});
 
 }  // namespace etendue

@@ -336,8 +336,8 @@ private:
         }
     }
 
-    /// What the noise of the rendering has more or less than that of the pilots, whose film has `growth` times as many pixels as
-    /// the one before.
+    /// What the noise of the rendering has more or less than that of the pilots, whose film has `growth` times as many pixels
+    /// as the one before.
     std::vector<double> factors_of_noise(double growth, double ratio) {
         using Kind = NoiseOfFilms::Kind;
         std::vector<NoiseOfFilms> noise;

@@ -91,7 +91,8 @@ private:
         double whole = 0;  ///< m
 
         double norm(size_t tile) const { return mu[tile] * mu[tile] + 0.01 * whole * whole; }
-        /// V of a tile for a rendering of N images. Where the tile is dark, the light of the film is what spikes stand out from.
+        /// V of a tile for a rendering of N images. Where the tile is dark, the light of the film is what spikes stand out
+        /// from.
         double limit(size_t tile, double N) const {
             return std::max(mu[tile], 0.1 * whole) * std::max(16.0, N);
         }

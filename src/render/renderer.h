@@ -56,8 +56,8 @@ struct RenderSettings : RenderOptions {
     /// Whether the film notes the brightest pass of every pixel, see Film::largest(). Passes of chains are not noted.
     bool keeps_largest = false;
     /// Whether what was learned is kept for integrators of which only whole passes can be traced again, see generation_of().
-    /// At most kGenerationBytes are, or those of one generation; what was learned first is given up first. None where there is no
-    /// memory for it.
+    /// At most kGenerationBytes are, or those of one generation; what was learned first is given up first. None where there is
+    /// no memory for it.
     bool keeps_generations = false;
     /// The processes that render the image together, each of them by a Renderer with these settings. They must outlive it.
     const Ranks* ranks = &kAlone;
@@ -147,7 +147,8 @@ public:
     /// may.
     std::shared_ptr<const Generation> generation_of(uint32_t pass) const;
     /// Traces what the samples of a pass of another renderer share, which has the same scene and settings; then the pass is
-    /// kept_pass(). Needs a renderer without passes, which cannot make any afterwards. Throws PassDropped if `drop` is set.
+    /// kept_pass(). An observer is told of all splats. Needs a renderer without passes, which cannot make any afterwards.
+    /// Throws PassDropped if `drop` is set.
     void trace_again(uint32_t pass, std::shared_ptr<const Generation> generation,
                      const std::atomic<bool>& drop);
 

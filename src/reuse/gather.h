@@ -128,7 +128,8 @@ private:
     }
 
     /// Probability of surviving the roulette for the whole search: most pairs of some vertices contribute little. The number of
-    /// pairs found has the second moment n (n+1), where n is its mean, and a search costs n+1 times as much as one that finds none.
+    /// pairs found has the second moment n (n+1), where n is its mean, and a search costs n+1 times as much as one that finds
+    /// none.
     float survival_of_search(const EyeEnd& eye) const {
         const float partners = std::max(1.0f, density.partners(eye.z.pair_level) *
                                                   sqr(eye.grid.radius() / inner_grid.radius()));

@@ -26,8 +26,8 @@ struct NextEventDraws {
 };
 
 /// A vertex fixed by the film point (Vertex) is not a random choice, and its sample is costly where it also gathers.
-/// Several next events there share that cost. Their number N is that of the least product of variance and time. With N' instead,
-/// variance and time of a sample are taken to be
+/// Several next events there share that cost. Their number N is that of the least product of variance and time. With N'
+/// instead, variance and time of a sample are taken to be
 ///     V - M(N) + M(N')   and   T - t N + t N'.
 /// M(N) is the part of the variance that belongs to paths that these next events can make,
 ///     Var(w C) / N^1.5 + ∫ (1 - w)² f² / (n_S p_S),

@@ -38,8 +38,8 @@ struct SideTallies {
 /// kRouletteMargin allows for it: M is credited with a tenth. Light paths shared by many eye paths make contributions
 /// correlated; then M is credited with a hundredth. Markov chains are credited with nothing: few of their states are
 /// independent samples, and those by one technique each. Classes that specular connections make have no credit either, since
-/// their contributions are proportional to a number of trials, which has no bound. Where M has no such reference, or the credit is too small, a
-/// lost class remains "too rare" and the report names it.
+/// their contributions are proportional to a number of trials, which has no bound. Where M has no such reference, or the credit
+/// is too small, a lost class remains "too rare" and the report names it.
 ///
 /// The credit affects which classes are tested, but not the test. Under the hypothesis that M is unbiased, its sum over
 /// a class consists of at least kEnoughContributions effective contributions, as for all other classes, so the level of
