@@ -77,7 +77,9 @@ public:
     void add(int parent, const std::string& name, nb::handle value, bool in_emitter,
              std::optional<size_t> replaced) {
         const std::vector<bool> is_reached = reached();
-        stays_ = replaced ? reached(parent, *replaced) : is_reached;
+        // One of the scene is replaced for all that refer to it.
+        const int without = replaced && parent < 0 ? scene_.roots[*replaced] : -1;
+        stays_ = replaced ? reached(parent, *replaced, without) : is_reached;
         for (size_t i = 0; i < is_reached.size(); ++i) {
             std::string& id = scene_.objects[i].id;
             if (!is_reached[i]) id.clear();  // of what an edit has removed
@@ -95,13 +97,15 @@ private:
         SourceLocation where;
     };
 
-    /// The objects that can be reached from the roots, but not by the given one of the children of a parent.
-    std::vector<bool> reached(int without_parent = -2, size_t without_slot = 0) const {
+    /// The objects that can be reached from the roots, but not by the given one of the children of a parent, nor by an object.
+    std::vector<bool> reached(int without_parent = -2, size_t without_slot = 0,
+                              int without = -1) const {
         std::vector<bool> is_reached(scene_.objects.size());
         std::vector<int> next;
         const auto add_all = [&](int parent, const auto& children, const auto& object_of) {
             for (size_t i = 0; i < children.size(); ++i)
-                if (parent != without_parent || i != without_slot)
+                if ((parent != without_parent || i != without_slot) &&
+                    object_of(children[i]) != without)
                     next.push_back(object_of(children[i]));
         };
         add_all(-1, scene_.roots, [](int object) { return object; });
@@ -245,20 +249,23 @@ struct Named {
 /// The objects of the scene (-1) or of an object by the keys under which paths and dicts have them.
 std::vector<Named> children_of(const SceneDescription& scene, int index) {
     std::vector<Named> all;
-    std::map<std::string, int> used;
-    const auto add = [&](const std::string& name, int object) {
-        if (!name.empty()) {
-            all.push_back({name, object});
-            return;
-        }
-        const std::string& category = scene.objects[size_t(object)].category;
-        const int number = ++used[category];
-        all.push_back({number == 1 ? category : fmt::format("{}_{}", category, number), object});
-    };
     if (index < 0)
-        for (const int root : scene.roots) add(scene.objects[size_t(root)].id, root);
+        for (const int root : scene.roots) all.push_back({scene.objects[size_t(root)].id, root});
     else
-        for (const auto& c : scene.objects[size_t(index)].children) add(c.name, c.object);
+        for (const auto& c : scene.objects[size_t(index)].children)
+            all.push_back({c.name, c.object});
+    // Names may be like automatic keys.
+    std::set<std::string> names;
+    for (const Named& c : all) names.insert(c.key);
+    std::map<std::string, int> used;
+    for (Named& c : all) {
+        if (!c.key.empty()) continue;
+        const std::string& category = scene.objects[size_t(c.object)].category;
+        do {
+            const int number = ++used[category];
+            c.key = number == 1 ? category : fmt::format("{}_{}", category, number);
+        } while (names.contains(c.key));
+    }
     return all;
 }
 
@@ -294,7 +301,8 @@ public:
         }
         is_written_[size_t(index)] = true;
         d["type"] = o.type;
-        if (!o.id.empty() && !is_root) d["id"] = o.id;
+        // The key of a root is its id, unless keys like this one stand for objects without an id.
+        if (!o.id.empty() && (!is_root || is_automatic(o.id, o.category))) d["id"] = o.id;
         if (o.id.empty() && uses_[size_t(index)] > 1) d["id"] = make_id(index, o.category);
         const char* const embedded = embedded_parameter(o);
         for (const Param& p : o.params)
@@ -427,6 +435,17 @@ void check_name(const SceneDescription& scene, const std::string& path, const Pl
     fail_unknown(scene, path, at);
 }
 
+/// What refers to the object `old` refers to `made` instead.
+void refer_to(SceneDescription& scene, int made, int old, const SourceLocation& where) {
+    for (SceneObject& o : scene.objects)
+        for (SceneObject::Child& c : o.children) {
+            if (c.object != old) continue;
+            check_nesting(o.category, scene.objects[size_t(made)].category, where);
+            c.object = made;
+        }
+    check_object_graph(scene, kDeepestNesting);
+}
+
 void set_in(SceneDescription& scene, const std::string& path, nb::handle value) {
     const Place at = find(scene, path);
     const SourceLocation where{path, 0};
@@ -455,6 +474,7 @@ void set_in(SceneDescription& scene, const std::string& path, nb::handle value) 
         if (parent < 0) {
             scene.roots[at.slot] = scene.roots.back();
             scene.roots.pop_back();
+            refer_to(scene, scene.roots[at.slot], at.object, where);
         } else {
             auto& children = scene.objects[size_t(parent)].children;
             children[at.slot] = children.back();
@@ -666,8 +686,8 @@ void bind_description(nb::module_& m) {
              "The parameter or object that a path names: a number, a text, a list of 3 numbers, a "
              "colour as {\"type\": \"rgb\"}, a 4x4 list, or a dict.")
         .def("__setitem__", &set, "path"_a, "value"_a,
-             "Sets a parameter, or replaces or adds an object given as a dict. Raises SceneError "
-             "for "
+             "Sets a parameter, or replaces or adds an object given as a dict; an object of the "
+             "scene is replaced for all that refer to it. Raises SceneError for "
              "an unknown name or a value of the wrong type, and changes nothing then.")
         .def("__delitem__", &erase, "path"_a, "Removes a parameter or an object.")
         .def(

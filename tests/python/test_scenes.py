@@ -81,6 +81,35 @@ def test_every_scene_survives_the_way_through_a_dict(scenes: Path, name: str) ->
     assert et.load_dict(d.to_dict(), folder=scenes).dump() == d.dump()
 
 
+def test_ids_may_look_like_automatic_keys() -> None:
+    """Two objects never have one key, and references find theirs."""
+    d = et.load_string("""<scene version="3.0.0"><shape type="sphere" id="shape"/><shape type="rectangle"/>
+        <sensor type="perspective" id="sensor"/><sensor type="orthographic"/><bsdf type="diffuse" id="bsdf_2"/>
+        <shape type="cube"><ref id="bsdf_2"/></shape></scene>""")
+    assert d.paths() == ["shape", "shape_2", "sensor", "sensor_2", "bsdf_2", "shape_3", "shape_3.bsdf"]
+    assert d["shape_2"]["type"] == "rectangle"
+    assert et.load_dict(d.to_dict()).dump() == d.dump()
+
+
+def test_objects_are_replaced_for_all_that_refer_to_them() -> None:
+    d = et.load_string("""<scene version="3.0.0"><bsdf type="diffuse" id="white"/>
+        <shape type="cube" id="a"><ref id="white"/></shape><shape type="sphere" id="b"><ref id="white"/></shape></scene>""")
+    before = d.copy()
+    d["white"] = {"type": "conductor"}
+    assert [d[path]["type"] for path in ("white", "a.bsdf", "b.bsdf")] == ["conductor"] * 3
+    assert "diffuse" not in d.dump() and before["a.bsdf"]["type"] == "diffuse"
+    for _ in range(2):
+        d["white"] = {"type": "twosided", "bsdf": {"type": "conductor", "id": "inner"}}
+    assert d["b.bsdf"]["type"] == "twosided"
+    d["white"] = {"type": "conductor"}
+    d["a.bsdf"] = {"type": "dielectric"}  # of this shape alone
+    assert [d[f"{shape}.bsdf"]["type"] for shape in "ab"] == ["dielectric", "conductor"]
+    text = d.dump()
+    with pytest.raises(et.SceneError):
+        d["white"] = {"type": "hdrfilm"}
+    assert d.dump() == text
+
+
 def test_names_of_plugins_tell_their_category() -> None:
     """Otherwise a dict could mean two things."""
     categories: dict[str, set[str]] = {}
