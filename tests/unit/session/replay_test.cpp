@@ -113,7 +113,8 @@ public:
     void load(LearnedState&) override {}
 
 private:
-    std::unique_ptr<Integrator> path_ = make_integrator(IntegratorSpec::parse("path:specular_connections=off"));
+    std::unique_ptr<Integrator> path_ =
+        make_integrator(IntegratorSpec::parse("path:specular_connections=off"));
     bool samples_alone_;
 };
 
@@ -160,8 +161,8 @@ TEST(Replay, SplatsAreThoseOfOnePass) {
 TEST(Replay, TracesAllLightPaths) {
     const Scene scene = room_with_ball();
     for (const int light_paths : {40, 64, 150}) {
-        RenderSettings settings =
-            settings_of("bdpt:roulette=0,specular_connections=off,light_paths=" + std::to_string(light_paths));
+        RenderSettings settings = settings_of(
+            "bdpt:roulette=0,specular_connections=off,light_paths=" + std::to_string(light_paths));
         settings.seed = 0;
         settings.spp = 1;
         Renderer renderer(scene, settings);
