@@ -29,9 +29,28 @@ struct Places {
     }
 };
 
+/// Places of another scene have numbers that this one may not have.
+void check(const Places& at) {
+    const size_t shapes = at.scene.shapes().size(), instances = at.scene.statistics().instances;
+    const auto is_one_of = [](int32_t number, size_t count) {
+        return number >= 0 && size_t(number) < count;
+    };
+    for (size_t i = 0; i < at.shape.size(); ++i) {
+        const int32_t shape = at.shape.data()[i], primitive = at.primitive.data()[i],
+                      instance = at.instance.data()[i];
+        if (is_one_of(shape, shapes) &&
+            (primitive < 0 ||
+             is_one_of(primitive, at.scene.shape(uint32_t(shape)).shape->primitive_count())) &&
+            (instance < 0 || is_one_of(instance, instances)))
+            continue;
+        throw nb::value_error("these are hits of another scene");
+    }
+}
+
 /// Calls body(i, bsdf) with the BSDF of each place.
 template <class Body>
 void for_each_bsdf(const Places& at, const Rows<const float, 3>& wo, const Body& body) {
+    check(at);
     struct Scratch {
         ComponentArena arena;
         Bsdf bsdf;

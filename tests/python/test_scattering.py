@@ -107,6 +107,19 @@ def test_instances_are_found_again() -> None:
     assert hits.instance == 0 and hits.p[0] == pytest.approx(5)
     np.testing.assert_allclose(scene.bsdf(hits).eval((1, 0, 0), (1, 0, 0)), np.full(3, 0.3 / np.pi), rtol=1e-5)
 
+    # A scene with as many shapes has no such instance, and one without triangles no such triangle.
+    def alone(shape: dict[str, Any]) -> et.Scene:
+        return et.load_dict({"type": "scene", "light": {"type": "constant"}, "sensor": {"type": "perspective"}, "a": shape}).build()
+
+    mesh = {"type": "mesh", "vertices": [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], "faces": [(0, 1, 2), (0, 2, 3)]}
+    second = alone(mesh).ray_intersect((-0.5, 0.5, 1), (0, 0, -1))
+    assert second.primitive == 1
+    for foreign, plain in ((hits, alone(part)), (second, alone({"type": "sphere"}))):
+        with pytest.raises(ValueError, match="hits of another scene"):
+            plain.bsdf(foreign).eval(UP, UP)
+        with pytest.raises(ValueError, match="hits of another scene"):
+            plain.bsdf(foreign).sample(UP, 0.5, (0.5, 0.5))
+
 
 def test_direct_light_by_hand_is_that_of_path(cornell: et.Scene) -> None:
     scene = et.load_dict({
