@@ -4,6 +4,7 @@
 #include <array>
 
 #include "guide/light_selection.h"
+#include "math/in_place.h"
 #include "math/rotated.h"
 
 namespace etendue {
@@ -59,13 +60,15 @@ std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
         inner *= sqr(rev_prev / z[last - 1].pdf_fwd);
         others += sqr(p_L) * inner;
     }
-    return Join{.technique = connection_technique(0, t),
-                .emitter = &emitter,
-                .contribution = v.beta * e.Le,
-                .mis_weight =
-                    power_heuristic(counts.hit * counts.reaching(v.is_fixed_by_film), others),
-                .film = z.film,
-                .needs_test = false};
+    return optional_of([&] {
+        return Join{.technique = connection_technique(0, t),
+                    .emitter = &emitter,
+                    .contribution = v.beta * e.Le,
+                    .mis_weight =
+                        power_heuristic(counts.hit * counts.reaching(v.is_fixed_by_film), others),
+                    .film = z.film,
+                    .needs_test = false};
+    });
 }
 
 namespace {
@@ -150,14 +153,16 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
                        z, last, false, {rev_last, rev_prev, gloss_of_emitter(emitter.is_area()), t},
                        counts));
     }
-    return Join{.technique = {Strategy::NextEvent, 1, t},
-                .emitter = &emitter,
-                .contribution = C,
-                .mis_weight = power_heuristic(counts.next_events(v.is_fixed_by_film), others),
-                .film = z.film,
-                .a = v.ray_end(),
-                .b = x0,
-                .to_infinity = infinite};
+    return optional_of([&] {
+        return Join{.technique = {Strategy::NextEvent, 1, t},
+                    .emitter = &emitter,
+                    .contribution = C,
+                    .mis_weight = power_heuristic(counts.next_events(v.is_fixed_by_film), others),
+                    .film = z.film,
+                    .a = v.ray_end(),
+                    .b = x0,
+                    .to_infinity = infinite};
+    });
 }
 
 namespace {
@@ -230,8 +235,8 @@ std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, co
     if (!edge) return {};
     const Technique technique{Strategy::Connect, s, t};
     const Vertex &a = y[s - 1], &b = z[t - 1];
-    return joined(*edge, technique,
-                  double(counts.of(technique) * counts.reaching(b.is_fixed_by_film)), y, a, z, b);
+    const double np = double(counts.of(technique) * counts.reaching(b.is_fixed_by_film));
+    return optional_of([&] { return joined(*edge, technique, np, y, a, z, b); });
 }
 
 std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, const SubPath& z,
@@ -245,11 +250,15 @@ std::optional<Join> join_gather(const Scene& scene, const SubPath& y, int s, con
     const double probability =
         counts.pairs.probability(drops_eye ? edge->rev_a : edge->rev_b, is_fixed_by_film);
     const double count = counts.weighed_gathers(x_m.pair_level, is_fixed_by_film, s + t - 2);
-    Join join = joined(*edge, {Strategy::Gather, s, t, drops_eye}, count * probability, y, a, z, b);
-    join.pair_probability = float(probability);
     // A density that is too small for a float belongs to a contribution that is zero, too.
-    if (!(join.pair_probability > 0)) return {};
-    return join;
+    const float pair_probability = float(probability);
+    if (!(pair_probability > 0)) return {};
+    return optional_of([&] {
+        Join join =
+            joined(*edge, {Strategy::Gather, s, t, drops_eye}, count * probability, y, a, z, b);
+        join.pair_probability = pair_probability;
+        return join;
+    });
 }
 
 namespace {
@@ -281,24 +290,28 @@ std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
              b.weight_sum);
     const double np = counts.merge_area(a.pair_level, b.is_fixed_by_film) * double(b.pdf_fwd);
     const float disc = counts.pairs.disc_of(b.is_fixed_by_film);
-    return Join{.technique = {Strategy::Merge, s, t},
-                .emitter = y[0].emitter,
-                .contribution = density_estimate(a.beta, a.wo, f, b, disc),
-                .mis_weight = float(sqr(np) / total),
-                .film = z.film,
-                .needs_test = false};
+    return optional_of([&] {
+        return Join{.technique = {Strategy::Merge, s, t},
+                    .emitter = y[0].emitter,
+                    .contribution = density_estimate(a.beta, a.wo, f, b, disc),
+                    .mis_weight = float(sqr(np) / total),
+                    .film = z.film,
+                    .needs_test = false};
+    });
 }
 
 std::optional<Join> join_photon(const Photon& photon, const SubPath& z, int t, float disc) {
     const Vertex& b = z[t - 1];
     const BsdfEval f = b.eval(photon.wi, TransportMode::Radiance);
     if (f.f.is_zero()) return {};
-    return Join{.technique = {Strategy::Merge, photon.s, t},
-                .emitter = photon.emitter,
-                .contribution = density_estimate(photon.power, photon.wi, f, b, disc),
-                .mis_weight = 1,
-                .film = z.film,
-                .needs_test = false};
+    return optional_of([&] {
+        return Join{.technique = {Strategy::Merge, photon.s, t},
+                    .emitter = photon.emitter,
+                    .contribution = density_estimate(photon.power, photon.wi, f, b, disc),
+                    .mis_weight = 1,
+                    .film = z.film,
+                    .needs_test = false};
+    });
 }
 
 namespace {
@@ -344,14 +357,16 @@ std::optional<Join> join_splat(const Scene& scene, const SubPath& y, int s, Samp
     if (counts.hit_lens > 0)
         others +=
             sqr(double(counts.hit_lens) * f.pdf * abs_dot(lens->ng, w) * inv_dist2 / lens->pdf_pos);
-    return Join{.technique = technique,
-                .emitter = y[0].emitter,
-                .contribution = C,
-                .mis_weight = power_heuristic(count, others),
-                .film = lens->film,
-                .a = {lens->p},
-                .b = a.ray_end(),
-                .to_infinity = a.is_infinite};
+    return optional_of([&] {
+        return Join{.technique = technique,
+                    .emitter = y[0].emitter,
+                    .contribution = C,
+                    .mis_weight = power_heuristic(count, others),
+                    .film = lens->film,
+                    .a = {lens->p},
+                    .b = a.ray_end(),
+                    .to_infinity = a.is_infinite};
+    });
 }
 
 std::optional<Join> join_hit_lens(const Scene& scene, const SubPath& y, int s,
@@ -375,15 +390,17 @@ std::optional<Join> join_hit_lens(const Scene& scene, const SubPath& y, int s,
                           y, s - 1, a.is_delta,
                           {rev_last, s >= 2 ? y[s - 2].pdf_rev : 0.0f, kLensGloss, s}, counts);
     if (!a.is_delta) others += sqr(counts.of(connection_technique(s, 1)) * p_lens);
-    return Join{.technique = {Strategy::HitLens, s + 1, 0},
-                .emitter = y[0].emitter,
-                .contribution = C,
-                .mis_weight = power_heuristic(counts.hit_lens, others),
-                .film = lens->film,
-                .a = {origin},
-                .b = {lens->p},
-                .to_infinity = a.is_infinite,
-                .needs_test = false};
+    return optional_of([&] {
+        return Join{.technique = {Strategy::HitLens, s + 1, 0},
+                    .emitter = y[0].emitter,
+                    .contribution = C,
+                    .mis_weight = power_heuristic(counts.hit_lens, others),
+                    .film = lens->film,
+                    .a = {origin},
+                    .b = {lens->p},
+                    .to_infinity = a.is_infinite,
+                    .needs_test = false};
+    });
 }
 
 }  // namespace etendue
