@@ -25,7 +25,7 @@ public:
         if (sees_front(point, frame))
             front_->append(point, frame, weight, list);
         else
-            back_->append(point, frame.flipped(), weight, list);
+            append_back(point, frame, weight, list);
     }
     bool is_two_sided() const override { return true; }
     bool may_be_smooth() const override {
@@ -45,6 +45,13 @@ public:
     }
 
 private:
+    /// A function of its own: together, both cases would load two coordinates of the normal at once, which stalls on the
+    /// stores that have just written them.
+    [[gnu::noinline]] void append_back(const SurfacePoint& point, const Frame& frame, float weight,
+                                       ComponentList& list) const {
+        back_->append(point, frame.flipped(), weight, list);
+    }
+
     const Material* front_;
     const Material* back_;
 };
