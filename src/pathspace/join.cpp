@@ -106,8 +106,9 @@ void prefetch_next_events(const Scene& scene, std::span<const WalkInTurn> walks)
     for (const WalkInTurn& w : walks)
         for (int i = 1; i < std::min(w.path->size(), int(kMostVertices)); ++i) {
             if (!(*w.path)[i].is_connectible) continue;
-            const EmitterChoice chosen = choose_emitter(scene, *w.path, i, *w.sampler, 0);
-            searches[count++] = {chosen, chosen.emitter->prefetch_search(chosen.u)};
+            Search& s = searches[count++];
+            s.chosen = choose_emitter(scene, *w.path, i, *w.sampler, 0);
+            s.searched = s.chosen.emitter->prefetch_search(s.chosen.u);
         }
     for (const Search& s : std::span(searches.data(), count))
         s.chosen.emitter->prefetch_result(s.chosen.u, s.searched);

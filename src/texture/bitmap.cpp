@@ -72,7 +72,7 @@ bool is_bounded(TextureWrap mode) {
     return mode == TextureWrap::Zero || mode == TextureWrap::One;
 }
 
-Neighbours neighbours(float t, int n, TextureWrap mode) {
+inline Neighbours neighbours(float t, int n, TextureWrap mode) {
     const float x = t * float(n) - 0.5f, floor = std::floor(x);
     int i0 = int(floor), i1 = i0 + 1;
     if (is_bounded(mode)) {
