@@ -8,6 +8,7 @@ import math
 import subprocess
 import sys
 import tempfile
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -59,9 +60,11 @@ def _render(world: Any, name: str, frame: int, threads: int, where: str) -> str 
     if _folder is None:
         _folder = tempfile.TemporaryDirectory(prefix="etendue-worlds-")
     image = Path(_folder.name) / f"{name}.exr"
-    blend, original = image.with_suffix(".blend"), world.original
+    # A rendering and a viewport may make the same image at the same time.
+    made = image.with_stem(f"{name}-{threading.get_ident()}")
+    blend, original = made.with_suffix(".blend"), world.original
     bpy.data.libraries.write(str(blend), {original}, path_remap="ABSOLUTE", fake_user=True)
-    order = {"blend": str(blend), "world": original.name, "image": str(image), "width": _width(world), "frame": frame,
+    order = {"blend": str(blend), "world": original.name, "image": str(made), "width": _width(world), "frame": frame,
              "threads": threads}
     program = [bpy.app.binary_path, "--background", "--factory-startup", "--python-exit-code", "1", "--python"]
     if not bpy.app.binary_path:  # Blender as a Python module
@@ -71,7 +74,10 @@ def _render(world: Any, name: str, frame: int, threads: int, where: str) -> str 
     if run.returncode:
         lines = (run.stderr or run.stdout).strip().splitlines()
         raise Refused(f"{where}: Cycles does not render it as an image: {lines[-1] if lines else run.returncode}")
-    return str(image) if image.exists() else None
+    if not made.exists():
+        return None
+    made.replace(image)
+    return str(image)
 
 
 def _width(world: Any) -> int:

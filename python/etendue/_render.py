@@ -1,6 +1,7 @@
 """Rendering, and its results."""
 
 import json
+import numbers
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Sequence
@@ -444,8 +445,8 @@ def render_sensors(
     if isinstance(scene, Scene):
         raise ValueError("a Scene has one sensor only: give its Description, or the dict or file that it was made of")
     description = described(scene)
-    if isinstance(sensors, (int, str)):
-        sensors = [sensors]
+    if isinstance(sensors, (numbers.Integral, str)):
+        sensors = [sensors]  # type: ignore[list-item]
     chosen: list[int | str] = []
     for sensor in range(len(_scene_of(description, resolution, threads, 0).sensors)) if sensors is None else sensors:
         chosen.append(sensor if isinstance(sensor, str) else whole("sensors", sensor))

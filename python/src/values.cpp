@@ -148,6 +148,11 @@ ParamValue value_of_dict(nb::dict d, const ValueContext& c) {
     const std::string type = text(d["type"]);
     if (type != "rgb" && type != "spectrum") return spectrum_plugin(type, d, c);
     for (const auto& [key, value] : d)
+        if (!is_text(key))
+            throw SceneError(c.where, fmt::format("names of parameters of colour \"{}\" are "
+                                                  "texts, not {}",
+                                                  type, nb::repr(key).c_str()));
+    for (const auto& [key, value] : d)
         if (text(key) != "type" && text(key) != "value")
             throw SceneError(c.where,
                              fmt::format("{} \"{}\" has no parameter \"{}\" (it has: value)",
@@ -208,11 +213,12 @@ ParamValue to_value(nb::handle value, const ValueContext& c) {
     }
     if (const auto v = number(value)) return *v;
     if (nb::hasattr(value, "__fspath__")) return text(nb::str(value));
+    constexpr const char* kExpected = "a number, a text, three numbers, or a 4x4 matrix";
+    if (PyBytes_Check(value.ptr()) || PyByteArray_Check(value.ptr())) refuse(value, c, kExpected);
     size_t rows = 0;
     const std::vector<double> v = numbers(value, rows);
     if (v.size() == 16 && rows == 4) return matrix(v);
-    if (v.size() != 3 || rows > 0)
-        refuse(value, c, "a number, a text, three numbers, or a 4x4 matrix");
+    if (v.size() != 3 || rows > 0) refuse(value, c, kExpected);
     if (is_colour) return to_rgb(v, c.where);
     return to_vec3(v, c.where);
 }

@@ -67,7 +67,11 @@ bool is_ignored(int signal) {
     sigset_t none;
     ::sigemptyset(&none);
     ::sigprocmask(SIG_SETMASK, &none, nullptr);
-    const int input = ::open("/dev/null", O_RDONLY);
+    // Where the parent has closed a standard stream, `log` or `failure` may have its number.
+    constexpr int kFirstOther = STDERR_FILENO + 1;
+    log = ::fcntl(log, F_DUPFD_CLOEXEC, kFirstOther);
+    failure = ::fcntl(failure, F_DUPFD_CLOEXEC, kFirstOther);
+    const int input = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
     ::dup2(input, STDIN_FILENO);
     ::dup2(log, STDOUT_FILENO);
     ::dup2(log, STDERR_FILENO);

@@ -157,6 +157,8 @@ def test_edits_by_path() -> None:
         ("bal.radius", 1, 'bal.radius: the scene has no "bal.radius" (known: '),
         ("ball.radius", "big", 'ball.radius: parameter "radius" of shape "sphere" must be a float, but is a string'),
         ("ball.center", (1, 2), "ball.center: expected a number, a text, three numbers, or a 4x4 matrix, found"),
+        ("ball.center", b"abc", "ball.center: expected a number, a text, three numbers, or a 4x4 matrix, found"),
+        ("white.reflectance", {"type": "rgb", 3: 1}, 'white.reflectance: names of parameters of colour "rgb" are texts, not 3'),
         ("ball.bsdf", {"type": "difuse"}, 'dict: bsdf: unknown plug-in "difuse" (did you mean "diffuse"?)'),
         ("ball.bsdf", {"type": "area"}, "dict: bsdf: "),
     ])
@@ -365,6 +367,8 @@ def test_sensors_are_chosen_by_number_or_name(program: str, tmp_path: Path) -> N
         for k, other in enumerate(s.sensor for s in scenes):
             assert np.array_equal(images[i], images[k]) == (chosen == other)
     np.testing.assert_array_equal(et.render(d, "path", spp=1, sensor="right", progress=False).image, images[3])
+    (one,) = et.render_sensors(d, "path", np.int64(2), spp=1, progress=False)
+    np.testing.assert_array_equal(one.image, images[3])
     for wrong in (3, -1, "middle"):
         with pytest.raises(et.SceneError, match=rf'there is no sensor "{wrong}" \(known: 0 to 2, or by name: perspective, left, right'):
             d.build(sensor=wrong)

@@ -38,6 +38,21 @@ TEST(ChildProcess, HasItsArgumentsAndStatus) {
     EXPECT_EQ(find_program("a program that is not there"), "");
 }
 
+/// The log would have the number of the closed stream.
+TEST(ChildProcess, KeepsItsLogWhereStandardInputIsClosed) {
+    const TemporaryFolder folder;
+    const std::string log = folder.path() / "log", shell = find_program("sh");
+    const int kept = ::dup(STDIN_FILENO);
+    ::close(STDIN_FILENO);
+    const int status = run_child({shell, "-c", "echo one; echo two >&2"}, log);
+    if (kept >= 0) {
+        ::dup2(kept, STDIN_FILENO);
+        ::close(kept);
+    }
+    EXPECT_EQ(status, 0);
+    EXPECT_EQ(text_of(log), "one\ntwo\n");
+}
+
 TEST(ChildProcess, EndsWithASignalThatIsHeld) {
     const TemporaryFolder folder;
     const auto old = std::signal(SIGTERM, SIG_IGN);
