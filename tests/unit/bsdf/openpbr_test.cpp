@@ -25,9 +25,10 @@ public:
               &materials_.make("openpbr", values, textures ? textures(materials_) : Children{})) {}
 
     const Material& operator*() const { return *material_; }
-    Bsdf bsdf(Vec3 wo = {0, 0, 1}) { return material_->bsdf(plane_point(wo), arena_); }
+    // Lobes point to what the material owns, so that no temporary may make them.
+    Bsdf bsdf(Vec3 wo = {0, 0, 1}) & { return material_->bsdf(plane_point(wo), arena_); }
     /// The only lobe.
-    OpenPbrLobe lobe() {
+    OpenPbrLobe lobe() & {
         const Bsdf made = bsdf();
         EXPECT_EQ(made.front().next, nullptr);
         return std::get<OpenPbrLobe>(made.front().lobe);
@@ -366,8 +367,8 @@ TEST(OpenPbr, ACoatRoughensWhatLiesBelowByItsWeight) {
 TEST(OpenPbr, ACoatMayLeaveTheRoughnessAsItIs) {
     const Values coated = kMetal + kCoat + rough(0.1);
     const auto at = [&](double share) {
-        return double(
-            Made(coated + Values{{"coat_affect_roughness", share}}).lobe().surface_roughness);
+        Made made(coated + Values{{"coat_affect_roughness", share}});
+        return double(made.lobe().surface_roughness);
     };
     EXPECT_NEAR(at(0), 0.1, 1e-5);
     EXPECT_NEAR(at(0.25), 0.75 * 0.1 + 0.25 * at(1), 1e-5);
@@ -377,7 +378,8 @@ TEST(OpenPbr, ACoatMayLeaveTheRoughnessAsItIs) {
 // η_s of the reference: the index relative to the coat, by its weight, and its inverse where that is below 1.
 TEST(OpenPbr, TheIndexBelowACoatIsRelativeToIt) {
     const auto eta = [](const Values& values) {
-        return double(Made(values + Values{{"coat_weight", 1.0}}).lobe().eta);
+        Made made(values + Values{{"coat_weight", 1.0}});
+        return double(made.lobe().eta);
     };
     const double relative = 1.6 / 1.5;
     EXPECT_NEAR(eta({}), relative, 1e-6);
@@ -396,12 +398,10 @@ TEST(OpenPbr, TheIndexBelowACoatIsRelativeToIt) {
 
 // A negative anisotropy stretches along v.
 TEST(OpenPbr, NegativeAnisotropyIsAQuarterTurn) {
-    const auto made = [](double anisotropy) {
-        return Made(kColors + kMetal + rough(0.5) +
-                    Values{{"specular_roughness_anisotropy", anisotropy}})
-            .lobe();
-    };
-    const OpenPbrLobe along_u = made(0.7), along_v = made(-0.7);
+    const Values metal = kColors + kMetal + rough(0.5);
+    Made one(metal + Values{{"specular_roughness_anisotropy", 0.7}}),
+        turned_one(metal + Values{{"specular_roughness_anisotropy", -0.7}});
+    const OpenPbrLobe along_u = one.lobe(), along_v = turned_one.lobe();
     const auto turned = [](Vec3 w) { return Vec3{w.y, -w.x, w.z}; };
     for (const Vec3 wo : test_directions())
         for (const Vec3 wi : test_directions())
@@ -422,7 +422,8 @@ TEST(OpenPbr, StretchedFacetsAreSmoothWhereTheirLobeIs) {
 
 TEST(OpenPbr, TheEstimateOfTheAlbedoHasTheLayers) {
     const auto albedo_of = [](const Values& values) {
-        return Made(kMetal + Values{{"base_color", Rgb(0.5f)}} + values).lobe().albedo_estimate();
+        Made made(kMetal + Values{{"base_color", Rgb(0.5f)}} + values);
+        return made.lobe().albedo_estimate();
     };
     const Rgb coated =
         albedo_of({{"coat_weight", 1.0}, {"coat_ior", 1.5}, {"coat_color", Rgb(0.1f, 0.5f, 1)}});
