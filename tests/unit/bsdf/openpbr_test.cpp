@@ -647,7 +647,8 @@ TEST(OpenPbr, MaterialReadsItsParameters) {
         EXPECT_THROW(Made(Values{{"coat_weight", 1.0}, {"fuzz_weight", 1.0}, wrong}), SceneError)
             << wrong.name;
     // Metal and dielectric are one component, glass is another one.
-    const Bsdf both = Made(kMetal + rough(0.5)).bsdf();
+    Made metal(kMetal + rough(0.5));
+    const Bsdf both = metal.bsdf();
     EXPECT_EQ(both.front().weight, 1);
     Made mixed(Values{{"base_metalness", 0.25}, {"transmission_weight", 0.4}});
     const Bsdf two = mixed.bsdf();
@@ -660,8 +661,9 @@ TEST(OpenPbr, MaterialReadsItsParameters) {
     const Bsdf pane = thin.bsdf();
     EXPECT_EQ(std::get<ThinDielectricLobe>(pane.front().lobe).transmittance, Rgb(0.5f));
     // The sharpest lobe counts.
-    EXPECT_FLOAT_EQ(Made(rough(0.5)).lobe().roughness(), 0.25f);
-    EXPECT_FLOAT_EQ(Made(kMetal + rough(0.5) + kCoat).lobe().roughness(), 0.09f);
+    Made base(rough(0.5)), coated(kMetal + rough(0.5) + kCoat);
+    EXPECT_FLOAT_EQ(base.lobe().roughness(), 0.25f);
+    EXPECT_FLOAT_EQ(coated.lobe().roughness(), 0.09f);
 }
 
 }  // namespace
