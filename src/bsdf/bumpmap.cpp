@@ -26,17 +26,25 @@ public:
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
-        nested_->append(point, bumped(point, frame), weight, list);
+        const TexturePoint at = point.texture_point();
+        nested_->append(point, bumped(point, at, frame, height_.gradient(at) * scale_), weight,
+                        list);
     }
     bool perturbs_normals() const override { return true; }
+    bool has_jet() const override { return height_.has_jet() && nested_->has_jet(); }
+    void turn(const SurfacePointJet& point, FrameOf<Vec3Dual>& frame) const override {
+        const Vec2Dual slope = height_.gradient_jet(point.at) * double(scale_);
+        frame = bumped(point, point.at, frame, slope);
+        nested_->turn(point, frame);
+    }
 
 private:
-    Frame bumped(const SurfacePoint& point, const Frame& frame) const {
+    template <class Point, class At, class V, class Slope>
+    FrameOf<V> bumped(const Point& point, const At& at, const FrameOf<V>& frame,
+                      const Slope& slope) const {
         if (height_.is_constant()) return frame;
-        const Vec2 slope = height_.texture()->gradient(point.texture_point()) * scale_;
-        const Vec3 n = frame.n;
-        const Vec3 normal = cross(point.dpdu + n * (slope.x - dot(n, point.dpdu)),
-                                  point.dpdv + n * (slope.y - dot(n, point.dpdv)));
+        const V n = frame.n, normal = cross(at.dpdu + n * (slope.x - dot(n, at.dpdu)),
+                                            at.dpdv + n * (slope.y - dot(n, at.dpdv)));
         return perturbed_frame(point, frame, dot(normal, n) < 0 ? -normal : normal);
     }
 

@@ -27,6 +27,12 @@ struct SurfacePoint {
     TexturePoint texture_point() const { return {uv, color, p, dpdu, dpdv, alpha, second_uv}; }
 };
 
+/// As SurfacePoint, in double, with derivatives by two parameters of the surface.
+struct SurfacePointJet {
+    Vec3d ng, wo;
+    TextureJetPoint at;
+};
+
 /// Storage for the second and further components of mixtures during a walk. reset() keeps the memory for reuse.
 class ComponentArena {
 public:
@@ -75,6 +81,10 @@ public:
     virtual bool may_have_delta() const { return true; }
     /// Whether it shades with other normals than that of the shape.
     virtual bool perturbs_normals() const { return false; }
+    /// Whether turn() does to frames what append() does.
+    virtual bool has_jet() const { return !perturbs_normals(); }
+    /// Turns the shading frame to the one in which append() has its lobes.
+    virtual void turn(const SurfacePointJet&, FrameOf<Vec3Dual>& /*frame*/) const {}
     /// Whether append() uses SurfacePoint::dpdu and dpdv.
     virtual bool needs_tangents() const { return true; }
     /// Approximate average reflectance, for heuristics.
@@ -94,8 +104,9 @@ public:
 
 protected:
     /// Whether `frame`, which an outer material may have turned, points to the side from which the surface is seen.
-    bool sees_front(const SurfacePoint& point, const Frame& frame) const {
-        if (!has_strict_normals_) return dot(point.wo, frame.n) >= 0;
+    template <class Point, class V>
+    bool sees_front(const Point& point, const FrameOf<V>& frame) const {
+        if (!has_strict_normals_) return !(dot(point.wo, frame.n) < 0);
         return (dot(point.wo, point.ng) < 0) == (dot(frame.n, point.ng) < 0);
     }
 

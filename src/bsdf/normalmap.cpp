@@ -23,15 +23,25 @@ public:
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
         const Rgb c = normals_.eval(point.texture_point());
-        // A two-sided material reverses t together with n, but the y of the map must not change.
-        const float t_sign = dot(frame.n, point.ng) < 0 ? -1.0f : 1.0f;
-        const Vec3 n =
-            frame.to_world({(2 * c.r - 1) * scale_, (2 * c.g - 1) * scale_ * t_sign, 2 * c.b - 1});
-        nested_->append(point, perturbed_frame(point, frame, n), weight, list);
+        nested_->append(point, tilted(point, frame, c), weight, list);
     }
     bool perturbs_normals() const override { return true; }
+    bool has_jet() const override { return normals_.has_jet() && nested_->has_jet(); }
+    void turn(const SurfacePointJet& point, FrameOf<Vec3Dual>& frame) const override {
+        frame = tilted(point, frame, normals_.eval_jet(point.at));
+        nested_->turn(point, frame);
+    }
 
 private:
+    template <class Point, class V, class Color>
+    FrameOf<V> tilted(const Point& point, const FrameOf<V>& frame, const Color& c) const {
+        // A two-sided material reverses t together with n, but the y of the map must not change.
+        const float t_sign = dot(frame.n, point.ng) < 0 ? -1.0f : 1.0f;
+        const V n =
+            frame.to_world({(2 * c.r - 1) * scale_, (2 * c.g - 1) * scale_ * t_sign, 2 * c.b - 1});
+        return perturbed_frame(point, frame, n);
+    }
+
     TextureRef normals_;
     float scale_;
 };

@@ -40,6 +40,12 @@ public:
     bool perturbs_normals() const override {
         return front_->perturbs_normals() || back_->perturbs_normals();
     }
+    bool has_jet() const override { return front_->has_jet() && back_->has_jet(); }
+    void turn(const SurfacePointJet& point, FrameOf<Vec3Dual>& frame) const override {
+        const bool is_front = sees_front(point, frame);
+        if (!is_front) frame = frame.flipped();
+        (is_front ? front_ : back_)->turn(point, frame);
+    }
     Rgb mean_albedo() const override {
         return (front_->mean_albedo() + back_->mean_albedo()) * 0.5f;
     }

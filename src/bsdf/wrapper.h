@@ -31,6 +31,10 @@ public:
     bool may_be_smooth() const override { return nested_->may_be_smooth(); }
     bool may_have_delta() const override { return nested_->may_have_delta(); }
     bool perturbs_normals() const override { return nested_->perturbs_normals(); }
+    bool has_jet() const override { return nested_->has_jet(); }
+    void turn(const SurfacePointJet& point, FrameOf<Vec3Dual>& frame) const override {
+        nested_->turn(point, frame);
+    }
     Rgb mean_albedo() const override { return nested_->mean_albedo(); }
 
 protected:
@@ -61,15 +65,17 @@ inline void refuse_view_dependence(const Params& params) {
 /// `frame.n` of the geometric surface: an `n` beyond it is mirrored about `frame.n`, as in Mitsuba 3 [Schüssler et al.
 /// 2017]. The condition uses ng, never the direction of view, so that both ends of a path see the same surface. Where
 /// mirroring does not help, or `n` is zero or not finite, `frame` is returned.
-inline Frame perturbed_frame(const SurfacePoint& point, const Frame& frame, Vec3 n) {
-    const float len = length(n);
-    if (!(len > 0 && std::isfinite(len))) return frame;
+template <class Point, class V>
+FrameOf<V> perturbed_frame(const Point& point, const FrameOf<V>& frame, V n) {
+    using std::isfinite;
+    const auto len = length(n);
+    if (!(len > 0 && isfinite(len))) return frame;
     n = n * (1 / len);
-    auto is_inside = [&](Vec3 m) {
+    auto is_inside = [&](V m) {
         return dot(m, frame.n) > 0 && dot(m, point.ng) * dot(frame.n, point.ng) > 0;
     };
     if (!is_inside(n)) n = reflect(n, frame.n);
-    return is_inside(n) ? Frame::from_normal_and_tangent(n, frame.s) : frame;
+    return is_inside(n) ? FrameOf<V>::from_normal_and_tangent(n, frame.s) : frame;
 }
 
 }  // namespace etendue

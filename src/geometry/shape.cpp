@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 #include <utility>
 
 #include "math/triangle.h"
@@ -111,7 +112,8 @@ std::optional<double> nearest_root(double a, double b, double c, double near) {
 }
 
 /// A vector under the upper 3×3 part of `m`.
-Vec3d transformed(const Transform::Matrix& m, Vec3d v) {
+template <class V>
+V transformed(const Transform::Matrix& m, V v) {
     return {m[0][0] * v.x + m[0][1] * v.y + m[0][2] * v.z,
             m[1][0] * v.x + m[1][1] * v.y + m[1][2] * v.z,
             m[2][0] * v.x + m[2][1] * v.y + m[2][2] * v.z};
@@ -159,6 +161,30 @@ Vec3 interpolate(Vec3 a, Vec3 b, Vec3 c, float u, float v) {
             interpolate(a.z, b.z, c.z, u, v)};
 }
 
+/// The mean of the texture coordinates of three vertices, with weights of type `T`.
+template <class V, class T>
+V mean_of(Vec2 a, Vec2 b, Vec2 c, T u, T v) {
+    const T w = 1 - u - v;
+    return {a.x * w + b.x * u + c.x * v, a.y * w + b.y * u + c.y * v};
+}
+
+/// ∂p/∂u and ∂p/∂v of a triangle from its edges and their differences of texture coordinates; zero where these are parallel.
+template <class V>
+std::pair<V, V> tangents_of(V e1, V e2, Vec2 d1, Vec2 d2) {
+    const float det = d1.x * d2.y - d1.y * d2.x;
+    if (det == 0) return {};
+    const float inv = 1 / det;
+    return {(e1 * d2.y - e2 * d1.y) * inv, (e2 * d1.x - e1 * d2.x) * inv};
+}
+
+/// Barycentric coordinates of a point `p` of the plane, relative to the first vertex; `n`: cross product of the edges.
+struct Barycentric {
+    double u, v;
+
+    Barycentric(Vec3d p, Vec3d e1, Vec3d e2, Vec3d n)
+        : u(dot(cross(p, e2), n) / dot(n, n)), v(dot(cross(e1, p), n) / dot(n, n)) {}
+};
+
 }  // namespace
 
 SurfaceGeometry TriangleMesh::surface(uint32_t prim, float u, float v, bool tangents) const {
@@ -182,25 +208,15 @@ SurfaceGeometry TriangleMesh::surface(uint32_t prim, float u, float v, bool tang
     }
     if (!colors_.empty()) g.color = colors_[ia] * w + colors_[ib] * u + colors_[ic] * v;
     if (!alphas_.empty()) g.alpha = alphas_[ia] * w + alphas_[ib] * u + alphas_[ic] * v;
-    const auto mean = [&](Vec2 of_a, Vec2 of_b, Vec2 of_c) -> Vec2 {
-        return {of_a.x * w + of_b.x * u + of_c.x * v, of_a.y * w + of_b.y * u + of_c.y * v};
-    };
-    if (!second_uvs_.empty()) g.second_uv = mean(second_uvs_[ia], second_uvs_[ib], second_uvs_[ic]);
+    if (!second_uvs_.empty())
+        g.second_uv = mean_of<Vec2>(second_uvs_[ia], second_uvs_[ib], second_uvs_[ic], u, v);
     if (!has_uvs_) {
         g.uv = {u, v};
         if (tangents) g.dpdu = e1, g.dpdv = e2;
         return g;
     }
-    g.uv = mean(a.uv, b.uv, c.uv);
-    if (tangents) {
-        const Vec2 d1 = b.uv - a.uv, d2 = c.uv - a.uv;
-        const float det = d1.x * d2.y - d1.y * d2.x;
-        if (det != 0) {
-            const float inv = 1 / det;
-            g.dpdu = (e1 * d2.y - e2 * d1.y) * inv;
-            g.dpdv = (e2 * d1.x - e1 * d2.x) * inv;
-        }
-    }
+    g.uv = mean_of<Vec2>(a.uv, b.uv, c.uv, u, v);
+    if (tangents) std::tie(g.dpdu, g.dpdv) = tangents_of(e1, e2, b.uv - a.uv, c.uv - a.uv);
     return g;
 }
 
@@ -209,26 +225,37 @@ std::optional<SurfaceJet> TriangleMesh::jet(uint32_t prim, Vec3d o, Vec3d d, dou
     const Vertex &a = vertices_[face.vertices[0]], &b = vertices_[face.vertices[1]],
                  &c = vertices_[face.vertices[2]];
     const Vec3d pa(a.p), e1 = Vec3d(b.p) - pa, e2 = Vec3d(c.p) - pa, n = cross(e1, e2);
-    const double slope = dot(d, n), n2 = dot(n, n);
+    const double slope = dot(d, n);
     if (slope == 0) return {};
     const Vec3d p = o + d * (dot(pa - o, n) / slope);
-    SurfaceJet j{.p = p,
-                 .ng = n / std::sqrt(n2),
-                 .ns = {},
-                 .dpdu = e1,
-                 .dpdv = e2,
-                 .dnsdu = {},
-                 .dnsdv = {}};
+    SurfaceJet j{
+        .p = p, .ng = normalize(n), .ns = {}, .dpdu = e1, .dpdv = e2, .dnsdu = {}, .dnsdv = {}};
     j.ns = j.ng;
     if (!has_normals_) return j;
-    const double u = dot(cross(p - pa, e2), n) / n2, v = dot(cross(e1, p - pa), n) / n2;
-    const Vec3d na(a.n), f1 = Vec3d(b.n) - na, f2 = Vec3d(c.n) - na, m = na + f1 * u + f2 * v;
+    const Barycentric at(p - pa, e1, e2, n);
+    const Vec3d na(a.n), f1 = Vec3d(b.n) - na, f2 = Vec3d(c.n) - na, m = na + f1 * at.u + f2 * at.v;
     const double size = length(m);
     if (!(size > 0)) return j;
     j.ns = m / size;
+    if (dot(j.ng, j.ns) < 0) j.ng = -j.ng;
     j.dnsdu = (f1 - j.ns * dot(j.ns, f1)) / size;
     j.dnsdv = (f2 - j.ns * dot(j.ns, f2)) / size;
     return j;
+}
+
+TextureJet TriangleMesh::texture_jet(uint32_t prim, const SurfaceJet& at) const {
+    const auto [ia, ib, ic] = faces_[prim].vertices;
+    const Vertex &a = vertices_[ia], &b = vertices_[ib], &c = vertices_[ic];
+    const Vec3d &e1 = at.dpdu, &e2 = at.dpdv;
+    const Barycentric bary(at.p - Vec3d(a.p), e1, e2, cross(e1, e2));
+    const Dual u(bary.u, 1, 0), v(bary.v, 0, 1);
+    TextureJet t;
+    if (!second_uvs_.empty())
+        t.second_uv = mean_of<Vec2Dual>(second_uvs_[ia], second_uvs_[ib], second_uvs_[ic], u, v);
+    if (!has_uvs_) return {{u, v}, t.second_uv, e1, e2};
+    t.uv = mean_of<Vec2Dual>(a.uv, b.uv, c.uv, u, v);
+    std::tie(t.dpdu, t.dpdv) = tangents_of(e1, e2, b.uv - a.uv, c.uv - a.uv);
+    return t;
 }
 
 ShapeSample TriangleMesh::sample(uint32_t prim, Vec2 u) const {
@@ -252,9 +279,38 @@ size_t TriangleMesh::memory_bytes() const {
 namespace {
 
 /// The azimuth of (x, y) over 2π, in [0, 1].
-float turns(float x, float y) {
-    const float phi = std::atan2(y, x);
+template <class T>
+T turns(T x, T y) {
+    using std::atan2;
+    const T phi = atan2(y, x);
     return (phi < 0 ? phi + 2 * kPi : phi) / (2 * kPi);
+}
+
+/// Texture coordinates of an analytic shape and their tangents, in its own space.
+template <class V, class UV>
+struct Parametrisation {
+    UV uv;
+    V along_u, along_v;
+};
+
+/// Of the unit sphere where its normal is `n`.
+template <class UV, class V>
+Parametrisation<V, UV> on_sphere(V n) {
+    using std::atan2, std::hypot;
+    using T = decltype(n.x);
+    const T sine = hypot(n.x, n.y);
+    // At a pole, where every azimuth is as good, that of 0.
+    const UV azimuth = sine > 0 ? UV{n.x / sine, n.y / sine} : UV{1, 0};
+    return {{turns(n.x, n.y), atan2(sine, n.z) / kPi},
+            {-n.y, n.x, 0},
+            {n.z * azimuth.x, n.z * azimuth.y, -sine}};
+}
+
+/// Of the unit disc at (x, y), whose distance from the centre is `radius`.
+template <class V, class UV, class T>
+Parametrisation<V, UV> on_disk(T x, T y, T radius) {
+    const T c = radius > 0 ? x / radius : T(1), s = radius > 0 ? y / radius : T(0);
+    return {{std::min(radius, T(1)), turns(c, s)}, {c, s, 0}, {-s, c, 0}};
 }
 
 }  // namespace
@@ -320,13 +376,11 @@ SurfaceGeometry Sphere::surface(uint32_t, float u, float v, bool tangents) const
     sincos(std::numbers::pi * v, &st, &ct);
     SurfaceGeometry g = at({st * cp, st * sp, ct});
     const Vec3 n = to_local_.vector(flip_ ? -g.ng : g.ng);
-    const float sine = std::hypot(n.x, n.y);
-    g.uv = {turns(n.x, n.y), std::atan2(sine, n.z) / kPi};
+    const auto here = on_sphere<Vec2>(n);
+    g.uv = here.uv;
     if (tangents) {
-        // At a pole, where every azimuth is as good, that of 0.
-        const Vec2 azimuth = sine > 0 ? Vec2{n.x / sine, n.y / sine} : Vec2{1, 0};
-        g.dpdu = orientation_.vector({-n.y, n.x, 0}) * (2 * kPi * radius_);
-        g.dpdv = orientation_.vector({n.z * azimuth.x, n.z * azimuth.y, -sine}) * (kPi * radius_);
+        g.dpdu = orientation_.vector(here.along_u) * (2 * kPi * radius_);
+        g.dpdv = orientation_.vector(here.along_v) * (kPi * radius_);
     }
     return g;
 }
@@ -336,15 +390,26 @@ std::optional<SurfaceJet> Sphere::jet(uint32_t, Vec3d o, Vec3d d, double near) c
     const double r = double(radius_);
     const auto t = nearest_root(dot(d, d), dot(v, d), dot(v, v) - r * r, near);
     if (!t) return {};
+    const double side = flip_ ? -1 : 1;
     const Vec3d n = (d * *t - v) / r;
     const TangentBasis tangents(normalize(n));
     return SurfaceJet{.p = o + d * *t,
-                      .ng = n,
-                      .ns = n,
+                      .ng = n * side,
+                      .ns = n * side,
                       .dpdu = tangents.s * r,
                       .dpdv = tangents.t * r,
-                      .dnsdu = tangents.s,
-                      .dnsdv = tangents.t};
+                      .dnsdu = tangents.s * side,
+                      .dnsdv = tangents.t * side};
+}
+
+TextureJet Sphere::texture_jet(uint32_t, const SurfaceJet& at) const {
+    const Vec3Dual n(at.ns, at.dnsdu, at.dnsdv);
+    const auto here = on_sphere<Vec2Dual>(transformed(to_local_.matrix(), flip_ ? -n : n));
+    const Transform::Matrix& m = orientation_.matrix();
+    return {here.uv,
+            {},
+            transformed(m, here.along_u) * double(2 * kPi * radius_),
+            transformed(m, here.along_v) * double(kPi * radius_)};
 }
 
 ShapeSample Sphere::sample(uint32_t, Vec2 u) const {
@@ -450,14 +515,14 @@ double Disk::area() const {
 SurfaceGeometry Disk::surface(uint32_t, float u, float v, bool tangents) const {
     const double x = near_[0] + double(u), y = near_[1] + double(v);
     const float radius = float(std::hypot(x, y));
-    const float c = radius > 0 ? float(x) / radius : 1, s = radius > 0 ? float(y) / radius : 0;
+    const auto here = on_disk<Vec3, Vec2>(float(x), float(y), radius);
     SurfaceGeometry g;
     g.p = rounded_point(to_world_, {x, y, 0});
     g.ng = g.ns = ng_;
-    g.uv = {std::min(radius, 1.0f), turns(c, s)};
+    g.uv = here.uv;
     if (tangents) {
-        g.dpdu = to_world_.vector({c, s, 0});
-        g.dpdv = to_world_.vector({-s, c, 0}) * (2 * kPi * radius);
+        g.dpdu = to_world_.vector(here.along_u);
+        g.dpdv = to_world_.vector(here.along_v) * (2 * kPi * radius);
     }
     return g;
 }
@@ -467,7 +532,7 @@ std::optional<SurfaceJet> Disk::jet(uint32_t, Vec3d o, Vec3d d, double) const {
     const Vec3d e1 = column(m, 0), e2 = column(m, 1), n = cross(e1, e2);
     const double slope = dot(d, n);
     if (slope == 0) return {};
-    const Vec3d unit = normalize(n);
+    const Vec3d unit = normalize(n) * (dot(n, Vec3d(ng_)) < 0 ? -1 : 1);
     return SurfaceJet{.p = o + d * (dot(column(m, 3) - o, n) / slope),
                       .ng = unit,
                       .ns = unit,
@@ -475,6 +540,17 @@ std::optional<SurfaceJet> Disk::jet(uint32_t, Vec3d o, Vec3d d, double) const {
                       .dpdv = e2,
                       .dnsdu = {},
                       .dnsdv = {}};
+}
+
+TextureJet Disk::texture_jet(uint32_t, const SurfaceJet& at) const {
+    const Transform::Matrix &m = to_world_.matrix(), &inv = to_local_.matrix();
+    const Vec3d local = transformed(inv, at.p) + column(inv, 3);
+    const Dual x(local.x, 1, 0), y(local.y, 0, 1), radius = hypot(x, y);
+    const auto here = on_disk<Vec3Dual, Vec2Dual>(x, y, radius);
+    return {here.uv,
+            {},
+            transformed(m, here.along_u),
+            transformed(m, here.along_v) * (2 * kPi * radius)};
 }
 
 ShapeSample Disk::sample(uint32_t, Vec2 u) const {
@@ -559,7 +635,7 @@ std::optional<SurfaceJet> Cylinder::jet(uint32_t, Vec3d o, Vec3d d, double near)
     const double x = lo.x + *t * ld.x, y = lo.y + *t * ld.y;
     // The transform has no shear, and scales x and y alike.
     const Vec3d n = column(m, 0) * x + column(m, 1) * y, dn = column(m, 1) * x - column(m, 0) * y;
-    const double size = length(n);
+    const double size = flip_ ? -length(n) : length(n);
     return SurfaceJet{.p = o + d * *t,
                       .ng = n / size,
                       .ns = n / size,
@@ -567,6 +643,16 @@ std::optional<SurfaceJet> Cylinder::jet(uint32_t, Vec3d o, Vec3d d, double near)
                       .dpdv = column(m, 2),
                       .dnsdu = dn / size,
                       .dnsdv = {}};
+}
+
+TextureJet Cylinder::texture_jet(uint32_t, const SurfaceJet& at) const {
+    const Transform::Matrix &m = to_world_.matrix(), &inv = to_local_.matrix();
+    const Vec3d local = transformed(inv, at.p) + column(inv, 3);
+    const Dual x(local.x, -local.y, 0), y(local.y, local.x, 0), z(local.z, 0, 1);
+    return {{turns(x, y), z},
+            {},
+            transformed(m, Vec3Dual(-y, x, 0)) * double(2 * kPi),
+            transformed(m, Vec3Dual(0, 0, 1))};
 }
 
 ShapeSample Cylinder::sample(uint32_t, Vec2 u) const {

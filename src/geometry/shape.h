@@ -52,6 +52,8 @@ public:
     /// Differential geometry where the line o + t·d meets `prim`, which extends beyond its edges: of several points the one
     /// with t nearest to `near`. Empty where there is none.
     virtual std::optional<SurfaceJet> jet(uint32_t prim, Vec3d o, Vec3d d, double near) const = 0;
+    /// Texture coordinates at the point of jet().
+    virtual TextureJet texture_jet(uint32_t prim, const SurfaceJet& at) const = 0;
     /// SurfaceGeometry::slack of the points of a primitive.
     virtual float slack(uint32_t) const { return 0; }
     /// Uniform in area on primitive `prim`.
@@ -106,6 +108,7 @@ public:
     /// (u, v) are the barycentric coordinates of the second and third vertex.
     SurfaceGeometry surface(uint32_t prim, float u, float v, bool tangents) const override;
     std::optional<SurfaceJet> jet(uint32_t prim, Vec3d o, Vec3d d, double near) const override;
+    TextureJet texture_jet(uint32_t prim, const SurfaceJet& at) const override;
     float slack(uint32_t prim) const override { return faces_[prim].slack; }
     ShapeSample sample(uint32_t prim, Vec2 u) const override;
     size_t memory_bytes() const override;
@@ -158,6 +161,7 @@ public:
     double area() const override;
     SurfaceGeometry surface(uint32_t, float u, float v, bool tangents) const override;
     std::optional<SurfaceJet> jet(uint32_t, Vec3d o, Vec3d d, double near) const override;
+    TextureJet texture_jet(uint32_t, const SurfaceJet& at) const override;
     float slack(uint32_t) const override { return slack_; }
     ShapeSample sample(uint32_t, Vec2 u) const override;
     /// From outside, uniform in the solid angle of the sphere.
@@ -199,6 +203,7 @@ public:
     double area() const override;
     SurfaceGeometry surface(uint32_t, float u, float v, bool tangents) const override;
     std::optional<SurfaceJet> jet(uint32_t, Vec3d o, Vec3d d, double near) const override;
+    TextureJet texture_jet(uint32_t, const SurfaceJet& at) const override;
     ShapeSample sample(uint32_t, Vec2 u) const override;
     bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const override;
     Vec2 parameters(Vec3 local) const override;
@@ -222,6 +227,7 @@ public:
     double area() const override;
     SurfaceGeometry surface(uint32_t, float u, float v, bool tangents) const override;
     std::optional<SurfaceJet> jet(uint32_t, Vec3d o, Vec3d d, double near) const override;
+    TextureJet texture_jet(uint32_t, const SurfaceJet& at) const override;
     ShapeSample sample(uint32_t, Vec2 u) const override;
     bool intersect(Vec3 o, Vec3 d, float tmin, float tmax, Hit& hit) const override;
     Vec2 parameters(Vec3 local) const override;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "math/vec3d.h"
+#include "math/dual.h"
 
 namespace etendue {
 
@@ -8,10 +8,16 @@ namespace etendue {
 /// parameters of the surface.
 struct SurfaceJet {
     Vec3d p;
-    Vec3d ng;  ///< Unit geometric normal, of either sign.
-    Vec3d ns;  ///< Unit interpolated normal, of either sign.
+    Vec3d ng;  ///< Unit geometric normal, on the side that SurfaceGeometry has.
+    Vec3d ns;  ///< Unit interpolated normal, of the same sign as there.
     Vec3d dpdu, dpdv;
     Vec3d dnsdu, dnsdv;
+};
+
+/// What SurfaceGeometry has for textures, with derivatives by the parameters of a SurfaceJet.
+struct TextureJet {
+    Vec2Dual uv, second_uv;
+    Vec3Dual dpdu, dpdv;  ///< Derivatives of p by uv.
 };
 
 }  // namespace etendue

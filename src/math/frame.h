@@ -5,34 +5,38 @@
 
 namespace etendue {
 
-struct Frame {
-    Vec3 s{1, 0, 0}, t{0, 1, 0}, n{0, 0, 1};
+/// A frame of vectors of type `V`.
+template <class V>
+struct FrameOf {
+    V s{1, 0, 0}, t{0, 1, 0}, n{0, 0, 1};
 
     /// Any right-handed frame about the unit vector `n` [Duff et al. 2017].
-    static Frame from_normal(Vec3 n) {
-        const float sign = std::copysign(1.0f, n.z);
-        const float a = -1.0f / (sign + n.z);
-        const float b = n.x * n.y * a;
+    static FrameOf from_normal(V n) {
+        using std::copysign;
+        const auto sign = copysign(1.0f, n.z);
+        const auto a = -1.0f / (sign + n.z), b = n.x * n.y * a;
         return {{1.0f + sign * n.x * n.x * a, sign * b, -sign * n.x},
                 {b, sign + n.y * n.y * a, -n.y},
                 n};
     }
 
     /// Frame about `n` whose `s` is the part of `dpdu` in the tangent plane; any frame where `dpdu` is parallel to `n`.
-    static Frame from_normal_and_tangent(Vec3 n, Vec3 dpdu) {
-        const Vec3 s = dpdu - n * dot(n, dpdu);
-        const float len2 = length2(s);
+    static FrameOf from_normal_and_tangent(V n, V dpdu) {
+        using std::sqrt;
+        const V s = dpdu - n * dot(n, dpdu);
+        const auto len2 = length2(s);
         // Closer than 1e-3 radians to n, cancellation leaves too little of s.
         if (!(len2 > 1e-6f * length2(dpdu)) || !(len2 > 0)) return from_normal(n);
-        const Vec3 unit = s * (1.0f / std::sqrt(len2));
+        const V unit = s * (1.0f / sqrt(len2));
         return {unit, cross(n, unit), n};
     }
 
-    Vec3 to_local(Vec3 v) const { return {dot(v, s), dot(v, t), dot(v, n)}; }
-    Vec3 to_world(Vec3 v) const { return s * v.x + t * v.y + n * v.z; }
+    V to_local(V v) const { return {dot(v, s), dot(v, t), dot(v, n)}; }
+    V to_world(V v) const { return s * v.x + t * v.y + n * v.z; }
     /// The frame with n and t reversed, so that it stays right-handed.
-    Frame flipped() const { return {s, -t, -n}; }
+    FrameOf flipped() const { return {s, -t, -n}; }
 };
+using Frame = FrameOf<Vec3>;
 
 inline float cos_theta(Vec3 w) {
     return w.z;
@@ -57,7 +61,8 @@ constexpr Vec3 reflect(Vec3 w) {
     return {-w.x, -w.y, w.z};
 }
 /// Mirror direction about the unit vector `m`.
-constexpr Vec3 reflect(Vec3 w, Vec3 m) {
+template <class V>
+constexpr V reflect(V w, V m) {
     return m * (2.0f * dot(w, m)) - w;
 }
 

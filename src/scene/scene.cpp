@@ -61,6 +61,18 @@ float opacity_of(const SceneShape& shape, const SurfaceGeometry& g) {
     return shape.material->opacity({g.uv, g.color, g.p, {}, {}, g.alpha, g.second_uv});
 }
 
+/// With the normal of the maps of a material, as seen from `wo`. Empty where it has no derivatives, as at poles.
+std::optional<SurfaceJet> shaded(const Material& material, const TextureJet& t, Vec3d wo,
+                                 SurfaceJet j) {
+    auto frame = FrameOf<Vec3Dual>::from_normal_and_tangent({j.ns, j.dnsdu, j.dnsdv}, t.dpdu);
+    material.turn({j.ng, wo, {t.uv, t.second_uv, {j.p, j.dpdu, j.dpdv}, t.dpdu, t.dpdv}}, frame);
+    j.ns = frame.n.value();
+    j.dnsdu = frame.n.by_1();
+    j.dnsdv = frame.n.by_2();
+    if (!std::isfinite(length(j.dnsdu) + length(j.dnsdv))) return {};
+    return j;
+}
+
 bool is_opaque(const SurfaceHit& hit) {
     return hit.shape->material->is_opaque();
 }
@@ -102,9 +114,14 @@ SurfaceGeometry Scene::surface(const SurfaceLocation& at) const {
 std::optional<SurfaceJet> Scene::jet(const SurfaceLocation& at, Vec3d o, Vec3d d,
                                      double near) const {
     const Shape& shape = *shapes_[at.shape].shape;
-    if (at.instance == kNoInstance) return shape.jet(at.prim, o, d, near);
+    const Material& material = *shapes_[at.shape].material;
+    const bool has_map = material.perturbs_normals();
+    if (at.instance == kNoInstance) {
+        std::optional<SurfaceJet> j = shape.jet(at.prim, o, d, near);
+        return j && has_map ? shaded(material, shape.texture_jet(at.prim, *j), -d, *j) : j;
+    }
     const Transform& t = owned_->accelerator.instance(at.instance).to_world;
-    const auto mapped = [](const Transform::Matrix& m, Vec3d v, double w) -> Vec3d {
+    const auto mapped = []<class V>(const Transform::Matrix& m, V v, double w) -> V {
         return {m[0][0] * v.x + m[0][1] * v.y + m[0][2] * v.z + w * m[0][3],
                 m[1][0] * v.x + m[1][1] * v.y + m[1][2] * v.z + w * m[1][3],
                 m[2][0] * v.x + m[2][1] * v.y + m[2][2] * v.z + w * m[2][3]};
@@ -119,18 +136,24 @@ std::optional<SurfaceJet> Scene::jet(const SurfaceLocation& at, Vec3d o, Vec3d d
     std::optional<SurfaceJet> j = shape.jet(at.prim, mapped(t.inverse_matrix(), o, 1),
                                             mapped(t.inverse_matrix(), d, 0), near);
     if (!j) return {};
+    const TextureJet texture = has_map ? shape.texture_jet(at.prim, *j) : TextureJet();
     j->p = mapped(t.matrix(), j->p, 1);
     j->dpdu = mapped(t.matrix(), j->dpdu, 0);
     j->dpdv = mapped(t.matrix(), j->dpdv, 0);
-    j->ng = normalize(mapped_normal(j->ng));
+    const double side = t.determinant3() < 0 ? -1 : 1;
+    j->ng = normalize(mapped_normal(j->ng)) * side;
     const Vec3d n = mapped_normal(j->ns);
-    const double size = length(n);
+    const double size = length(n) * side;
     j->ns = n / size;
     for (Vec3d* dn : {&j->dnsdu, &j->dnsdv}) {
         const Vec3d v = mapped_normal(*dn);
         *dn = (v - j->ns * dot(j->ns, v)) / size;
     }
-    return j;
+    if (!has_map) return j;
+    return shaded(material,
+                  {texture.uv, texture.second_uv, mapped(t.matrix(), texture.dpdu, 0),
+                   mapped(t.matrix(), texture.dpdv, 0)},
+                  -d, *j);
 }
 
 Vec3 Scene::point_on(const ClearShape& clear, float u_prim, Vec2 u) const {

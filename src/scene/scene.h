@@ -51,10 +51,10 @@ struct SceneShape {
     MediumId medium_toward(Vec3 ng, Vec3 d) const { return dot(ng, d) < 0 ? interior : exterior; }
 };
 
-/// Whether specular connections may have delta events at a surface. Maps of normals have no derivatives yet, and masks no
-/// certain events; their paths are left to hits.
+/// Whether specular connections may have delta events at a surface. Some maps of normals are not known in double, and masks
+/// have no certain events; their paths are left to hits.
 inline bool may_be_in_chain(const SceneShape& shape) {
-    return shape.material->is_opaque() && !shape.material->perturbs_normals();
+    return shape.material->is_opaque() && shape.material->has_jet();
 }
 
 /// A shape whose material has delta events alone, or one of those of an instance.
@@ -133,7 +133,8 @@ public:
     void prefetch_images(const SurfaceHit& hit) const;
     /// Geometry of a surface point.
     SurfaceGeometry surface(const SurfaceLocation& location) const;
-    /// Differential geometry where the line o + t·d meets the primitive at `location`, see Shape::jet().
+    /// Differential geometry where the line o + t·d meets the primitive at `location`, see Shape::jet(). `ns` is the normal of
+    /// the material's shading, as seen from the line's origin.
     std::optional<SurfaceJet> jet(const SurfaceLocation& location, Vec3d o, Vec3d d,
                                   double near) const;
     const std::vector<ClearShape>& clear_shapes() const { return clear_shapes_; }

@@ -17,16 +17,21 @@ public:
           v10_(params.rgb("v10", Rgb(0))), v11_(params.rgb("v11", Rgb(1))),
           to_uv_(params.transform("to_uv")) {}
 
-    Rgb eval(const TexturePoint& at) const override {
-        const Vec2 uv = at.uv;
-        const Vec2 p = to_uv_.point(uv);
-        const Rgb c = lerp(p.x, lerp(p.y, v00_, v01_), lerp(p.y, v10_, v11_));
-        return {std::max(c.r, 0.0f), std::max(c.g, 0.0f), std::max(c.b, 0.0f)};
-    }
+    Rgb eval(const TexturePoint& at) const override { return at_uv<Rgb>(at.uv); }
+    bool has_jet() const override { return true; }
+    RgbDual eval_jet(const TextureJetPoint& at) const override { return at_uv<RgbDual>(at.uv); }
     Rgb mean() const override { return eval(Vec2{0.5f, 0.5f}); }
     void resolution(int& width, int& height) const override { width = height = 16; }
 
 private:
+    template <class Color, class V>
+    Color at_uv(V uv) const {
+        using T = decltype(uv.x);
+        const V p = to_uv_.point(uv);
+        const Color c = lerp(p.x, lerp(p.y, v00_, v01_), lerp(p.y, v10_, v11_));
+        return {std::max(c.r, T(0)), std::max(c.g, T(0)), std::max(c.b, T(0))};
+    }
+
     Rgb v00_, v01_, v10_, v11_;
     UvTransform to_uv_;
 };

@@ -39,30 +39,35 @@ const float* decoding(bool srgb) {
 }
 
 /// A coordinate wrapped to [0, 1], and the derivative of the wrapping.
+template <class T>
 struct Wrapped {
-    float t, slope;
+    T t;
+    float slope;
 };
 
-Wrapped wrap(float u, TextureWrap mode) {
-    Wrapped w = {u, 1};
+template <class T>
+Wrapped<T> wrap(T u, TextureWrap mode) {
+    using std::floor;
+    Wrapped<T> w = {u, 1};
     switch (mode) {
-    case TextureWrap::Repeat: w.t = u - std::floor(u); break;
+    case TextureWrap::Repeat: w.t = u - floor(u); break;
     case TextureWrap::Mirror:
-        w.t = u - 2 * std::floor(u * 0.5f);
+        w.t = u - 2 * floor(u * 0.5f);
         if (w.t > 1) w = {2 - w.t, -1};
         break;
     case TextureWrap::Clamp: break;
     case TextureWrap::Zero:
-    case TextureWrap::One: return {u > -1 ? std::min(u, 2.0f) : -1.0f, 1};
+    case TextureWrap::One: return {u > -1 ? std::min(u, T(2)) : T(-1), 1};
     }
     // NaN becomes zero, so that indices are valid for any mesh.
-    return {w.t > 0 ? std::min(w.t, 1.0f) : 0.0f, w.slope};
+    return {w.t > 0 ? std::min(w.t, T(1)) : T(0), w.slope};
 }
 
 /// Two neighbouring texels along one axis and the weight of the second.
+template <class T>
 struct Neighbours {
     int i0, i1;
-    float weight;
+    T weight;
 };
 
 /// Index of a texel outside the unit square where its value is a constant.
@@ -72,25 +77,28 @@ bool is_bounded(TextureWrap mode) {
     return mode == TextureWrap::Zero || mode == TextureWrap::One;
 }
 
-inline Neighbours neighbours(float t, int n, TextureWrap mode) {
-    const float x = t * float(n) - 0.5f, floor = std::floor(x);
-    int i0 = int(floor), i1 = i0 + 1;
+template <class T>
+inline Neighbours<T> neighbours(T t, int n, TextureWrap mode) {
+    using std::floor;
+    const T x = t * float(n) - 0.5f, cell = floor(x);
+    int i0 = int(cell), i1 = i0 + 1;
     if (is_bounded(mode)) {
         const auto inside = [n](int i) { return i >= 0 && i < n ? i : kOutside; };
-        return {inside(i0), inside(i1), x - floor};
+        return {inside(i0), inside(i1), x - cell};
     }
     const bool repeat = mode == TextureWrap::Repeat;
     // Beyond its edge a mirrored image continues with the edge texel itself, so mirroring clamps here too.
     if (i0 < 0) i0 = repeat ? n - 1 : 0;
     if (i1 >= n) i1 = repeat ? 0 : n - 1;
-    return {i0, i1, x - floor};
+    return {i0, i1, x - cell};
 }
 
 }  // namespace
 
 /// The four texels around a point, with ∂t/∂u of the wrapping.
+template <class T>
 struct BitmapTexture::Footprint {
-    Neighbours x, y;
+    Neighbours<T> x, y;
     Vec2 slope;
 };
 
@@ -107,22 +115,24 @@ BitmapTexture::BitmapTexture(const PixelBuffer& image, const Options& options)
         image.data);
 }
 
-BitmapTexture::Footprint BitmapTexture::footprint(Vec2 uv) const {
-    const Vec2 p = options_.to_uv.point(uv);
+template <class V>
+inline auto BitmapTexture::footprint(V uv) const {
+    using T = decltype(uv.x);
+    const V p = options_.to_uv.point(uv);
     const TextureWrap along_u = options_.wrap, along_v = options_.wrap_v.value_or(along_u);
-    const Wrapped u = wrap(p.x, along_u), v = wrap(p.y, along_v);
+    const Wrapped<T> u = wrap(p.x, along_u), v = wrap(p.y, along_v);
     if (options_.filter == TextureFilter::Nearest) {
-        const auto nearest = [](float t, int n, TextureWrap mode) {
-            if (is_bounded(mode) && !(t >= 0 && t <= 1)) return kOutside;
+        const auto nearest = [](T t, int n, TextureWrap mode) {
+            if (is_bounded(mode) && (t < 0 || t > 1)) return kOutside;
             return std::min(int(t * float(n)), n - 1);
         };
         const int x = nearest(u.t, image_->width, along_u);
         const int y = nearest(v.t, image_->height, along_v);
-        return {{x, x, 0}, {y, y, 0}, {}};
+        return Footprint<T>{{x, x, 0}, {y, y, 0}, {}};
     }
-    return {neighbours(u.t, image_->width, along_u),
-            neighbours(v.t, image_->height, along_v),
-            {u.slope, v.slope}};
+    return Footprint<T>{neighbours(u.t, image_->width, along_u),
+                        neighbours(v.t, image_->height, along_v),
+                        {u.slope, v.slope}};
 }
 
 template <class Texels>
@@ -152,14 +162,15 @@ Rgb BitmapTexture::texel_or_outside(const Texels& texels, int x, int y) const {
     return Rgb(mode == TextureWrap::One ? 1.0f : 0.0f);
 }
 
-template <class Texels>
-inline Rgb BitmapTexture::filtered(const Texels& texels, const Footprint& f) const {
+template <class Texels, class T>
+inline auto BitmapTexture::filtered(const Texels& texels, const Footprint<T>& f) const {
+    using Color = decltype(lerp(f.y.weight, Rgb(), Rgb()));
     if (is_bounded_) [[unlikely]] {
         const auto at = [&](int x, int y) { return texel_or_outside(texels, x, y); };
         return lerp(f.y.weight, lerp(f.x.weight, at(f.x.i0, f.y.i0), at(f.x.i1, f.y.i0)),
                     lerp(f.x.weight, at(f.x.i0, f.y.i1), at(f.x.i1, f.y.i1)));
     }
-    if (options_.filter == TextureFilter::Nearest) return texel(texels, f.x.i0, f.y.i0);
+    if (options_.filter == TextureFilter::Nearest) return Color(texel(texels, f.x.i0, f.y.i0));
     return lerp(f.y.weight,
                 lerp(f.x.weight, texel(texels, f.x.i0, f.y.i0), texel(texels, f.x.i1, f.y.i0)),
                 lerp(f.x.weight, texel(texels, f.x.i0, f.y.i1), texel(texels, f.x.i1, f.y.i1)));
@@ -171,7 +182,7 @@ Rgb BitmapTexture::eval(const TexturePoint& at) const {
 }
 
 void BitmapTexture::prefetch(const TexturePoint& at) const {
-    const Footprint f = footprint(uv(at));
+    const Footprint<float> f = footprint(uv(at));
     std::visit(
         [&](const auto& texels) {
             for (const int y : {f.y.i0, f.y.i1})
@@ -187,9 +198,10 @@ float BitmapTexture::eval_scalar(const TexturePoint& at) const {
     return is_grey_ ? c.r : luminance(c);
 }
 
-Vec2 BitmapTexture::gradient(const TexturePoint& at) const {
-    const Footprint f = footprint(uv(at));
-    const auto slopes = [&](const auto& texels) -> Vec2 {
+template <class V>
+inline V BitmapTexture::gradient_at(V uv) const {
+    const auto f = footprint(uv);
+    const auto slopes = [&](const auto& texels) -> V {
         const auto scalar = [&](int x, int y) {
             const Rgb c = is_bounded_ ? texel_or_outside(texels, x, y) : texel(texels, x, y);
             return is_grey_ ? c.r : luminance(c);
@@ -200,6 +212,24 @@ Vec2 BitmapTexture::gradient(const TexturePoint& at) const {
                 lerp(f.x.weight, h01 - h00, h11 - h10) * float(image_->height) * f.slope.y};
     };
     return options_.to_uv.gradient(std::visit(slopes, image_->data));
+}
+
+Vec2 BitmapTexture::gradient(const TexturePoint& at) const {
+    return gradient_at(uv(at));
+}
+
+RgbDual BitmapTexture::eval_jet(const TextureJetPoint& at) const {
+    return std::visit([&](const auto& texels) { return filtered(texels, footprint(uv(at))); },
+                      image_->data);
+}
+
+Dual BitmapTexture::scalar_jet(const TextureJetPoint& at) const {
+    const RgbDual c = eval_jet(at);
+    return is_grey_ ? c.r : luminance(c);
+}
+
+Vec2Dual BitmapTexture::gradient_jet(const TextureJetPoint& at) const {
+    return gradient_at(uv(at));
 }
 
 void BitmapTexture::resolution(int& width, int& height) const {
@@ -222,8 +252,8 @@ Rgb BitmapTexture::image_mean(const Texels& texels) const {
     for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x)
             add(whole ? texel(texels, x, y)
-                      : filtered(texels, footprint({(float(x) + 0.5f) / kGrid,
-                                                    (float(y) + 0.5f) / kGrid})));
+                      : filtered(texels, footprint(Vec2{(float(x) + 0.5f) / kGrid,
+                                                        (float(y) + 0.5f) / kGrid})));
     const double n = double(width) * height;
     return {float(sum[0] / n), float(sum[1] / n), float(sum[2] / n)};
 }

@@ -41,6 +41,10 @@ public:
     Rgb eval(const TexturePoint& at) const override;
     float eval_scalar(const TexturePoint& at) const override;
     Vec2 gradient(const TexturePoint& at) const override;
+    bool has_jet() const override { return true; }
+    RgbDual eval_jet(const TextureJetPoint& at) const override;
+    Dual scalar_jet(const TextureJetPoint& at) const override;
+    Vec2Dual gradient_jet(const TextureJetPoint& at) const override;
     /// Asks for the memory that these functions read at `at`.
     void prefetch(const TexturePoint& at) const;
     Rgb mean() const override { return mean_; }
@@ -48,20 +52,26 @@ public:
     size_t memory_bytes() const override { return sizeof(*this); }
 
 private:
+    template <class T>
     struct Footprint;
 
-    Vec2 uv(const TexturePoint& at) const {
+    template <class Point>
+    auto uv(const Point& at) const {
         return options_.is_of_second_uv ? at.second_uv : at.uv;
     }
-    Footprint footprint(Vec2 uv) const;
+    /// `V`: a pair of numbers.
+    template <class V>
+    auto footprint(V uv) const;
     template <class Texels>
     const auto& first_value(const Texels& texels, int x, int y) const;
     template <class Texels>
     Rgb texel(const Texels& texels, int x, int y) const;
     template <class Texels>
     Rgb texel_or_outside(const Texels& texels, int x, int y) const;
-    template <class Texels>
-    Rgb filtered(const Texels& texels, const Footprint& f) const;
+    template <class Texels, class T>
+    auto filtered(const Texels& texels, const Footprint<T>& f) const;
+    template <class V>
+    V gradient_at(V uv) const;
     template <class Texels>
     Rgb image_mean(const Texels& texels) const;
 

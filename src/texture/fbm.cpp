@@ -20,13 +20,13 @@ public:
           omega_(params.number("roughness", 0.5f, 0, 1)) {}
 
     Rgb eval(const TexturePoint& at) const override { return Rgb(clamp(eval_scalar(at), 0, 1)); }
-    float eval_scalar(const TexturePoint& at) const override {
-        const Vec3 p = point(at);
-        if (kSum == Sum::Fbm) return fbm(p, omega_, octaves_);
-        if (kSum == Sum::Wrinkled) return turbulence(p, omega_, octaves_);
-        const float wind = fbm(p * 0.1f, 0.5f, 3), waves = fbm(p, 0.5f, 6);
-        return std::fabs(wind) * waves;
+    float eval_scalar(const TexturePoint& at) const override { return height(point(at)); }
+    bool has_jet() const override { return true; }
+    RgbDual eval_jet(const TextureJetPoint& at) const override {
+        const Dual value = clamp(scalar_jet(at), 0, 1);
+        return {value, value, value};
     }
+    Dual scalar_jet(const TextureJetPoint& at) const override { return height(point(at)); }
     Rgb mean() const override { return Rgb(kSum == Sum::Wrinkled ? 0.5f : 0.1f); }  // roughly
 
     static TextureEntry entry(const char* name, const char* doc) {
@@ -45,6 +45,15 @@ public:
     }
 
 private:
+    template <class V>
+    auto height(V p) const {
+        using std::fabs;
+        if (kSum == Sum::Fbm) return fbm(p, omega_, octaves_);
+        if (kSum == Sum::Wrinkled) return turbulence(p, omega_, octaves_);
+        const auto wind = fbm(p * 0.1f, 0.5f, 3), waves = fbm(p, 0.5f, 6);
+        return fabs(wind) * waves;
+    }
+
     int octaves_;
     float omega_;
 };

@@ -20,6 +20,15 @@ public:
     float eval_scalar(const TexturePoint& at) const override {
         return lerp(weight_.eval_scalar(at), value0_.eval_scalar(at), value1_.eval_scalar(at));
     }
+    bool has_jet() const override {
+        return value0_.has_jet() && value1_.has_jet() && weight_.has_jet();
+    }
+    RgbDual eval_jet(const TextureJetPoint& at) const override {
+        return lerp(weight_.scalar_jet(at), value0_.eval_jet(at), value1_.eval_jet(at));
+    }
+    Dual scalar_jet(const TextureJetPoint& at) const override {
+        return lerp(weight_.scalar_jet(at), value0_.scalar_jet(at), value1_.scalar_jet(at));
+    }
     Rgb mean() const override {  // exact where the weight is constant
         return lerp(luminance(weight_.mean()), value0_.mean(), value1_.mean());
     }

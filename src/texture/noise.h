@@ -1,7 +1,7 @@
 #pragma once
 // Gradient noise and its sums, as pbrt's textures of space use them.
 
-#include "math/vec.h"
+#include "math/dual.h"
 
 namespace etendue {
 
@@ -14,7 +14,9 @@ inline float noise(float x, float y) {
 
 /// Fractional Brownian motion: Σ ω^i noise(1.99^i p) over i < octaves.
 float fbm(Vec3 p, float omega, int octaves);
+Dual fbm(Vec3Dual p, float omega, int octaves);
 /// Σ ω^i |noise(1.99^i p)| over i < octaves, and 0.2 ω^octaves for the octaves that are left out, as in pbrt.
 float turbulence(Vec3 p, float omega, int octaves);
+Dual turbulence(Vec3Dual p, float omega, int octaves);
 
 }  // namespace etendue

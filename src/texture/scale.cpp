@@ -15,12 +15,21 @@ public:
 
     Rgb eval(const TexturePoint& at) const override { return value_.eval(at) * scale_.eval(at); }
     float eval_scalar(const TexturePoint& at) const override {
-        if (!scale_.is_constant() || !is_grey(scale_.eval(at))) return luminance(eval(at));
-        return value_.eval_scalar(at) * scale_.eval_scalar(at);
+        return is_by_number() ? value_.eval_scalar(at) * number() : luminance(eval(at));
     }
     Vec2 gradient(const TexturePoint& at) const override {
-        if (!scale_.is_constant() || !is_grey(scale_.eval(at))) return Texture::gradient(at);
-        return value_.gradient(at) * scale_.eval(at).r;
+        return is_by_number() ? value_.gradient(at) * number() : Texture::gradient(at);
+    }
+    bool has_jet() const override { return value_.has_jet() && scale_.has_jet(); }
+    RgbDual eval_jet(const TextureJetPoint& at) const override {
+        return value_.eval_jet(at) * scale_.eval_jet(at);
+    }
+    Dual scalar_jet(const TextureJetPoint& at) const override {
+        return is_by_number() ? value_.scalar_jet(at) * double(number()) : luminance(eval_jet(at));
+    }
+    Vec2Dual gradient_jet(const TextureJetPoint& at) const override {
+        return is_by_number() ? value_.gradient_jet(at) * double(number())
+                              : Texture::gradient_jet(at);
     }
     Rgb mean() const override {  // exact where one of the two is constant
         return value_.mean() * scale_.mean();
@@ -31,6 +40,8 @@ public:
     }
 
 private:
+    bool is_by_number() const { return scale_.is_constant() && is_grey(scale_.mean()); }
+    float number() const { return scale_.mean().r; }
     static std::string value_name(const Params& params) {
         if (params.has("value")) return "value";
         for (const auto& c : params.children("texture"))

@@ -22,12 +22,27 @@ TextureEntry wrinkled_entry();
 TextureEntry windy_entry();
 TextureEntry marble_entry();
 
-Vec2 Texture::gradient(const TexturePoint& at) const {
+namespace {
+
+/// The gradient of `value(point)`.
+template <class Gradient, class Point, class Value>
+Gradient differences(const Texture& texture, const Point& at, const Value& value) {
     int width, height;
-    resolution(width, height);
+    texture.resolution(width, height);
     const Vec2 h = {0.1f / float(width), 0.1f / float(height)};
-    return {(eval_scalar(at.moved({h.x, 0})) - eval_scalar(at.moved({-h.x, 0}))) / (2 * h.x),
-            (eval_scalar(at.moved({0, h.y})) - eval_scalar(at.moved({0, -h.y}))) / (2 * h.y)};
+    return {(value(at.moved({h.x, 0})) - value(at.moved({-h.x, 0}))) / (2 * h.x),
+            (value(at.moved({0, h.y})) - value(at.moved({0, -h.y}))) / (2 * h.y)};
+}
+
+}  // namespace
+
+Vec2 Texture::gradient(const TexturePoint& at) const {
+    return differences<Vec2>(*this, at, [&](const TexturePoint& p) { return eval_scalar(p); });
+}
+
+Vec2Dual Texture::gradient_jet(const TextureJetPoint& at) const {
+    return differences<Vec2Dual>(*this, at,
+                                 [&](const TextureJetPoint& p) { return scalar_jet(p); });
 }
 
 void refine(int& width, int& height, std::initializer_list<const TextureRef*> textures) {

@@ -10,7 +10,9 @@
 
 #include "color/rgb.h"
 #include "description/params.h"
+#include "math/dual.h"
 #include "math/vec.h"
+#include "texture/texture_jet.h"
 
 namespace etendue {
 
@@ -50,6 +52,11 @@ public:
     virtual float eval_scalar(const TexturePoint& at) const { return luminance(eval(at)); }
     /// (∂/∂u, ∂/∂v) of eval_scalar(), for bump mapping; by central differences unless overridden.
     virtual Vec2 gradient(const TexturePoint& at) const;
+    /// Whether the functions below are known: those above in double, with derivatives.
+    virtual bool has_jet() const { return false; }
+    virtual RgbDual eval_jet(const TextureJetPoint&) const { return {}; }
+    virtual Dual scalar_jet(const TextureJetPoint& at) const { return luminance(eval_jet(at)); }
+    virtual Vec2Dual gradient_jet(const TextureJetPoint& at) const;
     /// Average over the unit square, for the power of emitters and average albedos; may be approximate.
     virtual Rgb mean() const = 0;
     /// Size of a grid over the unit square that resolves the texture's detail, for importance sampling.
@@ -79,6 +86,16 @@ public:
     Vec2 gradient(const TexturePoint& at) const {
         return texture_ ? texture_->gradient(at) : Vec2();
     }
+    bool has_jet() const { return !texture_ || texture_->has_jet(); }
+    RgbDual eval_jet(const TextureJetPoint& at) const {
+        return texture_ ? bounded(texture_->eval_jet(at)) : RgbDual(constant_);
+    }
+    Dual scalar_jet(const TextureJetPoint& at) const {
+        return texture_ ? bounded(texture_->scalar_jet(at)) : Dual(double(scalar_));
+    }
+    Vec2Dual gradient_jet(const TextureJetPoint& at) const {
+        return texture_ ? texture_->gradient_jet(at) : Vec2Dual();
+    }
     /// eval() at a surface point, whose texture_point() is made only where there is a texture.
     template <class Point>
     requires requires(const Point& at) { TexturePoint(at.texture_point()); }
@@ -93,7 +110,11 @@ public:
 
 private:
     float bounded(float v) const { return hi_ < kInf ? clamp(v, 0, hi_) : v; }
-    Rgb bounded(Rgb c) const { return {bounded(c.r), bounded(c.g), bounded(c.b)}; }
+    Dual bounded(Dual v) const { return hi_ < kInf ? clamp(v, 0, double(hi_)) : v; }
+    template <class Color>
+    Color bounded(Color c) const {
+        return {bounded(c.r), bounded(c.g), bounded(c.b)};
+    }
 
     Rgb constant_;
     float scalar_ = 0;  ///< eval_scalar() of the constant.

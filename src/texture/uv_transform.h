@@ -20,12 +20,14 @@ public:
                 m_[row][column] = float(t.matrix()[row][column == 2 ? 3 : column]);
     }
 
-    Vec2 point(Vec2 uv) const {
+    template <class V>
+    V point(V uv) const {
         return {m_[0][0] * uv.x + m_[0][1] * uv.y + m_[0][2],
                 m_[1][0] * uv.x + m_[1][1] * uv.y + m_[1][2]};
     }
     /// Converts a gradient with respect to point(uv) to one with respect to uv.
-    Vec2 gradient(Vec2 g) const {
+    template <class V>
+    V gradient(V g) const {
         return {m_[0][0] * g.x + m_[1][0] * g.y, m_[0][1] * g.x + m_[1][1] * g.y};
     }
     /// From the size of a grid over the unit square of point(uv) to that of a grid of the same detail over the unit

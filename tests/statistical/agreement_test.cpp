@@ -303,6 +303,14 @@ std::vector<AgreementCase> specular_cases() {
         {"tinted", front + lit + sphere("0,-0.2,0.1", "0.45", kGlass + absorbing), false},
         {"mask", front + lit + masked_pane + sphere("0,-0.4,0.1", "0.45", kGlass), false},
         {"bumped_glass", front + lit + sphere("0,-0.3,0.1", "0.45", bumped(kGlass)), false},
+        {"normal_mapped_glass",
+         front + lit + sphere("0,-0.3,0.1", "0.45", normal_mapped(kGlass, "0.4", "2")), false},
+        // Water in which the floor is seen.
+        {"bump_mapped_water",
+         front + lit +
+             rectangle("<rotate x=\"1\" angle=\"-90\"/><translate y=\"-0.5\"/>",
+                       bump_mapped(kGlass, "0.1", "2")),
+         false},
         {"plastic", front + lit + sphere("0,-0.3,0.1", "0.6", kPlastic), false},
         {"smooth_mesh", front + lit + smooth_mesh(kGlass), false},
         {"environment",

@@ -564,6 +564,37 @@ TEST(SpecularConnections, PointLightBelowAMirror) {
         0.03);
 }
 
+/// Light paths find the light, too, where the floor is seen directly.
+TEST(SpecularConnections, PointLightBehindMapsIsThatOfLightPaths) {
+    const std::string plain = "<bsdf type=\"dielectric\">" + kPlainGlass,
+                      mirror = "<bsdf type=\"conductor\"/>", above = point_light("0.3,-0.2,4"),
+                      down = "<rotate x=\"1\" angle=\"180\"/>";
+    const auto plate = [](const std::string& turn, const std::string& bsdf) {
+        return rectangle("<scale value=\"6\"/>" + turn + "<translate z=\"3\"/>", bsdf);
+    };
+    const struct {
+        const char* name;
+        std::string objects;
+        int depth;
+    } cases[] = {
+        {"normal_map_of_an_interface", plate("", normal_mapped(plain, "0.5")) + above, 3},
+        {"bump_map_of_an_interface", plate("", bump_mapped(plain, "1")) + above, 3},
+        {"normal_map_of_a_mirror",
+         plate(down, normal_mapped(mirror, "0.3", "2")) + point_light("0.3,-0.2,2.5"), 3},
+        {"bump_maps_of_a_pane",
+         "<shape type=\"cube\"><transform name=\"to_world\"><scale x=\"6\" y=\"6\" "
+         "z=\"0.25\"/><translate z=\"3\"/></transform>" +
+             bump_mapped(plain, "1") + "</shape>" + above,
+         4},
+    };
+    for (const auto& c : cases) {
+        const Scene scene = build(camera_above("perspective", 1) + floor_of(kFloor) + c.objects);
+        const std::string depth = fmt::format(":max_depth={}", c.depth);
+        expect_same_image(render_tiles(scene, "path" + depth + kSpecular, {4096}),
+                          render_tiles(scene, "light" + depth, {32768}), 0.05, c.name);
+    }
+}
+
 /// At the centre of a glass ball, light leaves straight, or returns to the centre and leaves on the other side.
 TEST(SpecularConnections, PointLightInAGlassBall) {
     const Scene scene = build(camera_above("perspective", 1) + floor_of(kFloor, 1.5f) +

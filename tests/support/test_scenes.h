@@ -84,6 +84,26 @@ inline const std::string kRoughGlass =
 inline const std::string kGlass = "<bsdf type=\"dielectric\"/>";
 inline const std::string kPlastic = "<bsdf type=\"plastic\"/>";
 
+/// An image of tests/scenes as a texture, which is repeated `times` along u and v.
+inline std::string map_image(const std::string& name, const std::string& file,
+                             const std::string& times) {
+    return "<texture type=\"bitmap\" name=\"" + name +
+           "\"><string name=\"filename\" value=\"" ETENDUE_SOURCE_DIR "/tests/scenes/" + file +
+           "\"/><boolean name=\"raw\" value=\"true\"/><transform name=\"to_uv\"><scale value=\"" +
+           times + "\"/></transform></texture>";
+}
+/// Materials with a map of normals, and of heights in units of `scale`.
+inline std::string normal_mapped(const std::string& bsdf, const std::string& scale = "1",
+                                 const std::string& times = "1") {
+    return "<bsdf type=\"normalmap\">" + map_image("normalmap", "normals.ppm", times) +
+           "<float name=\"scale\" value=\"" + scale + "\"/>" + bsdf + "</bsdf>";
+}
+inline std::string bump_mapped(const std::string& bsdf, const std::string& scale,
+                               const std::string& times = "1") {
+    return "<bsdf type=\"bumpmap\">" + map_image("displacement", "heights.pgm", times) +
+           "<float name=\"scale\" value=\"" + scale + "\"/>" + bsdf + "</bsdf>";
+}
+
 /// Room with lamp, and spheres of rough metal, rough glass, plastic and glass.
 inline std::string mixed_room(const std::string& the_sensor) {
     return the_sensor + room() + area_lamp() + sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) +

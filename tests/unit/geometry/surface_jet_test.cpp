@@ -1,5 +1,6 @@
 // Differential geometry of shapes against differences of near points.
 
+#include <array>
 #include <memory>
 
 #include <gtest/gtest.h>
@@ -25,15 +26,19 @@ std::vector<NamedShape> shapes() {
         normals.push_back(normalize(n));
     std::vector<NamedShape> list;
     list.push_back({"sphere", std::make_unique<Sphere>(to_world, true), true});
-    list.push_back({"cylinder", std::make_unique<Cylinder>(to_world, false), true});
-    list.push_back({"disk", std::make_unique<Disk>(to_world, false), false});
+    list.push_back({"cylinder", std::make_unique<Cylinder>(to_world, true), true});
+    list.push_back({"disk", std::make_unique<Disk>(to_world, true), false});
     list.push_back({"triangle",
                     std::make_unique<TriangleMesh>(
                         TriangleMesh::Arrays{.positions = points, .triangles = {{0, 1, 2}}}),
                     false});
     list.push_back({"smooth_triangle",
-                    std::make_unique<TriangleMesh>(TriangleMesh::Arrays{
-                        .positions = points, .normals = normals, .triangles = {{0, 1, 2}}}),
+                    std::make_unique<TriangleMesh>(
+                        TriangleMesh::Arrays{.positions = points,
+                                             .normals = normals,
+                                             .uvs = {{0.1f, 0.2f}, {1.3f, 0.4f}, {0, -0.8f}},
+                                             .second_uvs = {{1, 0.2f}, {2, 4}, {0.5f, -1}},
+                                             .triangles = {{0, 2, 1}}}),
                     true});
     return list;
 }
@@ -42,6 +47,11 @@ std::vector<NamedShape> shapes() {
 std::pair<double, double> coordinates(const SurfaceJet& at, Vec3d v) {
     const Vec3d n = cross(at.dpdu, at.dpdv);
     return {dot(cross(v, at.dpdv), n) / dot(n, n), dot(cross(at.dpdu, v), n) / dot(n, n)};
+}
+
+std::array<Dual, 10> numbers(const TextureJet& t) {
+    return {t.uv.x,   t.uv.y,   t.second_uv.x, t.second_uv.y, t.dpdu.x,
+            t.dpdu.y, t.dpdu.z, t.dpdv.x,      t.dpdv.y,      t.dpdv.z};
 }
 
 TEST(SurfaceJet, DerivativesAreLimitsOfDifferences) {
@@ -70,6 +80,19 @@ TEST(SurfaceJet, DerivativesAreLimitsOfDifferences) {
                 EXPECT_LT(length(plus->p - minus->p - expected), 1e-4 * kStep) << name;
                 EXPECT_LT(length(plus->ns - minus->ns - normal), 1e-4 * kStep) << name;
                 greatest = std::max(greatest, length(normal) / kStep);
+
+                const auto here = numbers(shape->texture_jet(0, *at)),
+                           after = numbers(shape->texture_jet(0, *plus)),
+                           before = numbers(shape->texture_jet(0, *minus));
+                for (size_t k = 0; k < here.size(); ++k) {
+                    const double difference = after[k].value - before[k].value,
+                                 size = 1 + std::hypot(here[k].by_1, here[k].by_2);
+                    // Azimuths jump.
+                    if (std::fabs(difference) > 0.5) continue;
+                    EXPECT_NEAR(difference / kStep, (here[k].by_1 * u + here[k].by_2 * v) / kStep,
+                                1e-5 * size * size * size)
+                        << name << ' ' << k;
+                }
             }
         }
         EXPECT_EQ(greatest > 0.1, is_curved) << name << ": " << greatest;
@@ -91,12 +114,17 @@ TEST(SurfaceJet, IsThatOfTheHit) {
             RayHit hit;
             if (!accelerator.intersect(ray, hit)) continue;
             ++hits;
-            const SurfaceGeometry g = shape->surface(hit.prim, hit.u, hit.v, false);
+            const SurfaceGeometry g = shape->surface(hit.prim, hit.u, hit.v, true);
             const auto at = shape->jet(hit.prim, Vec3d(o), Vec3d(ray.d), double(hit.t));
             if (!at || abs_dot(ray.d, g.ng) < 0.05f) continue;
             EXPECT_LT(length(at->p - Vec3d(g.p)), 2e-5) << name;
-            EXPECT_GT(std::fabs(dot(at->ng, Vec3d(g.ng))), 1 - 1e-6) << name;
-            EXPECT_GT(std::fabs(dot(at->ns, Vec3d(g.ns))), 1 - 1e-6) << name;
+            EXPECT_GT(dot(at->ng, Vec3d(g.ng)), 1 - 1e-6) << name;
+            EXPECT_GT(dot(at->ns, Vec3d(g.ns)), 1 - 1e-6) << name;
+            const auto numbers_at = numbers(shape->texture_jet(hit.prim, *at));
+            const float expected[] = {g.uv.x,   g.uv.y,   g.second_uv.x, g.second_uv.y, g.dpdu.x,
+                                      g.dpdu.y, g.dpdu.z, g.dpdv.x,      g.dpdv.y,      g.dpdv.z};
+            for (size_t k = 0; k < numbers_at.size(); ++k)
+                EXPECT_NEAR(numbers_at[k].value, expected[k], 1e-4) << name << ' ' << k;
         }
         EXPECT_GT(hits, 400) << name;
     }

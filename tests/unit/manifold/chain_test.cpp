@@ -16,10 +16,9 @@ namespace {
 const SeedPhotons kNoPhotons;
 const std::string kMirror = "<bsdf type=\"conductor\"/>";
 
-std::string pane(const std::string& y) {
-    return test::rectangle("<rotate x=\"1\" angle=\"-90\"/><scale value=\"3\"/><translate y=\"" +
-                               y + "\"/>",
-                           test::kGlass);
+std::string pane(const std::string& y, const std::string& bsdf = test::kGlass) {
+    return test::rectangle(
+        "<rotate x=\"1\" angle=\"-90\"/><scale value=\"3\"/><translate y=\"" + y + "\"/>", bsdf);
 }
 std::string smooth_mesh(const std::string& bsdf, const std::string& transform) {
     return "<shape type=\"obj\"><string name=\"filename\" value=\"" ETENDUE_SOURCE_DIR
@@ -44,6 +43,16 @@ std::vector<ChainCase> cases() {
          "<shape type=\"cylinder\"><point name=\"p0\" x=\"-0.6\" y=\"0\" z=\"0\"/><point "
          "name=\"p1\" x=\"0.6\" y=\"0.1\" z=\"0.2\"/><float name=\"radius\" value=\"0.3\"/>" +
              test::kGlass + "</shape>"},
+        {"normal_mapped_pane", pane("0", test::normal_mapped(test::kGlass, "0.7"))},
+        {"bump_mapped_pane", pane("0", test::bump_mapped(test::kGlass, "0.5"))},
+        {"normal_mapped_ball",
+         test::sphere("0,0,0", "0.5", test::normal_mapped(test::kGlass, "0.1"))},
+        {"bump_mapped_mirrors",
+         test::sphere("1.1,0.6,0", "0.5", test::bump_mapped(kMirror, "0.02", "2")) +
+             pane("1.9",
+                  "<bsdf type=\"twosided\">" + test::bump_mapped(kMirror, "0.3") + "</bsdf>")},
+        {"normal_mapped_mesh",
+         smooth_mesh(test::normal_mapped(test::kGlass, "0.2"), "<scale value=\"0.6\"/>")},
         // A glass ball stretched to an ellipsoid.
         {"instance",
          "<shape type=\"shapegroup\" id=\"g\">" + test::sphere("0,0,0", "0.5", test::kGlass) +

@@ -33,6 +33,12 @@ std::vector<SpecularCase> weight_cases() {
                                  sphere("0.5,-0.5,0.2", "0.3", kPlastic)},
         {"environment",
          front + sphere("0,-0.2,0.1", "0.45", kGlass) + "<emitter type=\"constant\"/>"},
+        {"normal_map",
+         front + area_lamp() + sphere("0,-0.2,0.1", "0.45", normal_mapped(kGlass, "0.2", "2"))},
+        {"bump_map", front + area_lamp() +
+                         sphere("0,-0.2,0.1", "0.45", bump_mapped(kGlass, "0.02", "2")) +
+                         sphere("-0.6,-0.6,0.1", "0.3",
+                                bump_mapped("<bsdf type=\"conductor\"/>", "0.02", "2"))},
         {"several",
          front + area_lamp() + sphere("0,-0.2,0.1", "0.45", kGlass) +
              sphere("0.1,-0.2,0.1", "0.1",
