@@ -55,9 +55,8 @@ float positive_number(const json& value, const std::string& file, const std::str
                       float most) {
     // As a float: numbers may be too small or too large for one.
     const float v = value.is_number() ? value.get<float>() : 0.0f;
-    if (!(v > 0 && v <= most && std::isfinite(v)))
-        refuse(file, fmt::format("{} must be a number above 0{}, but is {}", what,
-                                 std::isfinite(most) ? fmt::format(", at most {}", most) : "",
+    if (!(v > 0 && v <= most))
+        refuse(file, fmt::format("{} must be a number above 0, at most {:g}, but is {}", what, most,
                                  excerpt(value)));
     return v;
 }
@@ -99,7 +98,8 @@ GivenPath parse_path(const json& from, const std::string& file, size_t index) {
             else
                 path.cones = {positive_number(value, file, what, kWidestCone)};
         } else if (key == "radius") {
-            path.radius = positive_number(value, file, where + ": \"radius\"", kInf);
+            path.radius =
+                positive_number(value, file, where + ": \"radius\"", GivenPath::kFarthest);
         } else {
             refuse(file,
                    fmt::format("{} has \"{}\", but only name, points, cone and radius are known",

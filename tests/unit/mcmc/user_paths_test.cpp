@@ -165,6 +165,10 @@ TEST(UserPaths, BadFilesAreRefused) {
                 .find("\"radius\" must be a number above 0"),
             std::string::npos)
             << radius;
+    // Rays to an emitter start so far from it.
+    EXPECT_NE(message("[{\"points\": [[0,0,0],[1,0,0]], \"radius\": 1e19}]")
+                  .find("\"radius\" must be a number above 0, at most 1e+15, but is 1e+19"),
+              std::string::npos);
     EXPECT_NE(message("[{\"points\": [[0,0,0],[1,0,0]], \"cone\": [1,2]}]").find("2 angles for 1"),
               std::string::npos);
 }
