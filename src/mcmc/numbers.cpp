@@ -27,6 +27,11 @@ void NumberTable::throw_too_many() {
     throw std::logic_error("Markov chain: too many numbers at a vertex");
 }
 
+void NumberTable::forget_all() {
+    for (auto& table : tables_) table.clear();
+    ++epoch_;
+}
+
 inline uint32_t NumberSource::draw(Stream stream, uint64_t vertex, uint32_t slot,
                                    NumberTable::Place place) const {
     const uint64_t random = hash_address(key_, stream, vertex, slot);

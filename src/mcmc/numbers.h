@@ -14,10 +14,14 @@ namespace etendue {
 
 /// The numbers that one state has read.
 class NumberTable {
+    static constexpr uint32_t kNever = 0;  ///< Epoch of numbers that no state has read.
+
 public:
-    void clear() { ++epoch_; }
+    void clear() {
+        if (++epoch_ == kNever) forget_all();
+    }
     struct Number {
-        uint32_t bits = 0, epoch = 0;
+        uint32_t bits = 0, epoch = kNever;
     };
     /// Where the number at an address is, in any table.
     struct Place {
@@ -58,8 +62,10 @@ private:
     /// Joins to the lens are numbered from here on in Stream::Connection.
     static constexpr uint64_t kLensVertex = 0x8000;
     [[noreturn]] static void throw_too_many();
+    /// Once all epochs were used: numbers of the first ones would be taken for those of the next.
+    void forget_all();
 
-    /// By stream, and those of joins to the lens; they never shrink.
+    /// By stream, and those of joins to the lens.
     std::array<std::vector<Number>, kStreams + 1> tables_;
     uint32_t epoch_ = 1;
 };

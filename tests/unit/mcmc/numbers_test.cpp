@@ -124,6 +124,25 @@ TEST(Numbers, ThoseThatWereNotReadAreDrawnAfresh) {
     }
 }
 
+TEST(Numbers, AreForgottenHoweverOftenTheTableWasCleared) {
+    const auto read = NumberTable::place(Stream::Eye, 1, 0),
+               never_read = NumberTable::place(Stream::Eye, 1, 1);
+    NumberTable first;
+    first.set(read, 42);
+    LearnedState saved;
+    first.save(saved);
+    std::vector<std::byte> bytes = saved.take();
+    std::fill_n(bytes.begin(), sizeof(uint32_t), std::byte{0xff});  // The number of the last state.
+    LearnedState of_last(std::move(bytes));
+    NumberTable table;
+    table.load(of_last);
+    for (int i = 0; i < 3; ++i) {
+        table.clear();
+        EXPECT_EQ(table.find(read), nullptr);
+        EXPECT_EQ(table.find(never_read), nullptr);
+    }
+}
+
 TEST(Numbers, ReadTwiceAreTheSame) {
     NumberTable present, next;
     NumberSource source(NumberStep::Fresh, 1, nullptr, &next);
