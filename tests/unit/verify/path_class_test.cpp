@@ -19,11 +19,12 @@ public:
     explicit ClassObserver(const Scene& scene) : scene_(scene) {}
     void observe(const Join& join, Rgb, float, const FilmTarget&, const Workspace& paths) override {
         if (join.technique.vertices() > 5) return;
-        const PathClass c = classify(scene_, join, paths.y, paths.z, 0);
+        const SubPath& y = paths.light_side(join.technique);
+        const PathClass c = classify(scene_, join, y, paths.z, 0);
         EXPECT_EQ(PathClass::from_key(c.key()), c);
         EXPECT_TRUE(can_make(join.technique, c))
             << "s = " << join.technique.s << ", events " << c.delta_events;
-        EXPECT_GT(shortest_edge(scene_, join, paths.y, paths.z), 0);
+        EXPECT_GT(shortest_edge(scene_, join, y, paths.z), 0);
         made[c].insert(join.technique.s);
     }
     std::map<PathClass, std::set<int>> made;
