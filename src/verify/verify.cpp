@@ -37,9 +37,10 @@ IntegratorSpec limited(IntegratorSpec spec, int longest) {
 }
 
 /// References use neither Russian roulette nor specular connections, so that these of methods are verified as well.
-IntegratorSpec as_reference(IntegratorSpec spec, int longest) {
+IntegratorSpec as_reference(IntegratorSpec spec, int longest, const Scene& scene) {
     spec.params.emplace("rr_depth", std::to_string(longest + 1));
-    if (!spec.make && integrator_entry(spec.name).info.has_param("specular_connections"))
+    if (scene.may_have_chains() && !spec.make &&
+        integrator_entry(spec.name).info.has_param("specular_connections"))
         spec.params.emplace("specular_connections", "off");
     return spec;
 }
@@ -129,7 +130,8 @@ public:
           begin_(std::chrono::steady_clock::now()) {
         for (const IntegratorSpec& m : methods) make_integrator(limited(m, options.longest));
         for (const IntegratorSpec& r : options.against)
-            reference_specs_.push_back(as_reference(limited(r, options.longest), options.longest));
+            reference_specs_.push_back(
+                as_reference(limited(r, options.longest), options.longest, renderer.scene()));
         renderer.choose_cut_offs(reference_specs_.front());
         // Streams of random numbers: 1 is that of the first reference.
         uint64_t stream = 1;

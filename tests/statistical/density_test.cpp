@@ -47,7 +47,8 @@ INSTANTIATE_TEST_SUITE_P(Methods, SampleDensities,
                                            Densities{"light", kLitRoom, "light", 14},
                                            Densities{"bdpt", kLitRoom, "bdpt:roulette=0", 14},
                                            Densities{"lamp_in_glass", lamp_in_glass(),
-                                                     "bdpt:roulette=0", 10}),
+                                                     "bdpt:roulette=0,specular_connections=off",
+                                                     10}),
                          [](const auto& p) { return std::string(p.param.name); });
 
 }  // namespace
