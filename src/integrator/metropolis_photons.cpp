@@ -248,12 +248,14 @@ MapPhotons MetropolisPhotons::trace(const PassContext& context, uint32_t pass,
     if (!options_.user_paths.empty() && !user_paths_)
         user_paths_ = UserPaths::load(context.scene, options_.user_paths);
     if (!states_) {
-        states_ = make_states(context, importons);
+        std::unique_ptr<PhotonStates> states = make_states(context, importons);
+        if (!states) return photons;
+        pilot_ = run_pilot(context, states->space());
+        states_ = std::move(states);
+        // Of what an earlier part of the rendering has counted.
         if (context.film.passes() > 0) context.forget_statistics();
     }
-    if (!states_) return photons;
     const StateSpace& space = states_->space();
-    pilot_ = run_pilot(context, space);
     if (!(pilot_.b > 0)) return photons;
 
     constexpr double kMostPool = double(1 << 24);

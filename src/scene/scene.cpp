@@ -95,7 +95,7 @@ Scene::Scene(const Scene&) = default;
 Scene Scene::seen_by_film(int width, int height) const {
     Scene other(*this);
     other.film_ = {.width = width, .height = height, .crop_width = width, .crop_height = height};
-    other.sensor_ = make_resized(sensor_, film_, width, height);
+    other.sensor_ = make_resized(*sensor_, film_, width, height, filter_.radius() - 0.5f);
     return other;
 }
 

@@ -15,10 +15,7 @@ public:
         const Vec3 x = to_world.vector({2.0f / float(film_.width), 0, 0});
         const Vec3 y = to_world.vector({0, 2.0f / (aspect_ * float(film_.height)), 0});
         pixel_area_ = abs_dot(cross(x, y), forward_);
-        const float r = context.filter_radius - 0.5f;
-        lo_ = {float(film_.crop_x) - r, float(film_.crop_y) - r};
-        hi_ = {float(film_.crop_x + film_.crop_width) + r,
-               float(film_.crop_y + film_.crop_height) + r};
+        set_margin(Vec2{1, 1} * (context.filter_radius - 0.5f));
     }
 
     SensorRay sample_ray(Vec2 film, Vec2) const override {
@@ -43,12 +40,24 @@ public:
 
     bool is_orthographic() const override { return true; }
     float pdf_direction(Vec3, Vec3) const override { return 1 / pixel_area_; }
+    std::shared_ptr<const Sensor> with_margin(Vec2 margin) const override {
+        auto copy = std::make_shared<OrthographicSensor>(*this);
+        copy->set_margin(margin);
+        return copy;
+    }
 
 private:
+    void set_margin(Vec2 margin) {
+        lo_ = Vec2{float(film_.crop_x), float(film_.crop_y)} - margin;
+        hi_ =
+            Vec2{float(film_.crop_x + film_.crop_width), float(film_.crop_y + film_.crop_height)} +
+            margin;
+    }
+
     Transform to_world_, to_local_;
     FilmGeometry film_;
     Vec3 forward_;
-    Vec2 lo_, hi_;
+    Vec2 lo_, hi_;  ///< Film points that are measured.
     float aspect_, pixel_area_;
 };
 

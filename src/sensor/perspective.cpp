@@ -24,10 +24,7 @@ public:
           forward_(normalize(to_world.vector({0, 0, 1}))) {
         pixel_area_ = (2 * camera.half_width / float(camera.film.width)) *
                       (2 * camera.half_height / float(camera.film.height));
-        const FilmGeometry& f = camera.film;
-        lo_ = {float(f.crop_x) - filter_radius + 0.5f, float(f.crop_y) - filter_radius + 0.5f};
-        hi_ = {float(f.crop_x + f.crop_width) + filter_radius - 0.5f,
-               float(f.crop_y + f.crop_height) + filter_radius - 0.5f};
+        set_margin(Vec2{1, 1} * (filter_radius - 0.5f));
         pdf_pos_ = has_finite_lens() ? 1 / (kPi * sqr(camera.lens_radius)) : 1.0f;
     }
 
@@ -72,6 +69,12 @@ public:
         return b;
     }
     float pdf_direction(Vec3, Vec3 d) const override { return pdf_of_cosine(dot(forward_, d)); }
+
+    std::shared_ptr<const Sensor> with_margin(Vec2 margin) const override {
+        auto copy = std::make_shared<PerspectiveSensor>(*this);
+        copy->set_margin(margin);
+        return copy;
+    }
 
 private:
     Vec3 to_world(Vec3 v) const { return left_ * v.x + up_ * v.y + forward_ * v.z; }
@@ -127,9 +130,15 @@ private:
         return SensorSample{lens, forward_, film, pdf_pos_ * pdf, pdf_pos_, pdf};
     }
 
+    void set_margin(Vec2 margin) {
+        const FilmGeometry& f = camera_.film;
+        lo_ = Vec2{float(f.crop_x), float(f.crop_y)} - margin;
+        hi_ = Vec2{float(f.crop_x + f.crop_width), float(f.crop_y + f.crop_height)} + margin;
+    }
+
     PerspectiveCamera camera_;
     Vec3 origin_, left_, up_, forward_;  ///< Origin and axes of camera space, in world space.
-    Vec2 lo_, hi_;                       ///< Film points within the filter's radius of the crop.
+    Vec2 lo_, hi_;                       ///< Film points that are measured.
     float pixel_area_, pdf_pos_;
 };
 

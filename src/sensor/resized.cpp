@@ -8,11 +8,11 @@ namespace {
 
 class ResizedSensor final : public Sensor {
 public:
-    ResizedSensor(std::shared_ptr<const Sensor> sensor, const FilmGeometry& film, int width,
-                  int height)
-        : sensor_(std::move(sensor)), origin_{float(film.crop_x), float(film.crop_y)},
+    ResizedSensor(const Sensor& sensor, const FilmGeometry& film, int width, int height,
+                  Vec2 margin)
+        : origin_{float(film.crop_x), float(film.crop_y)},
           pixel_{float(film.crop_width) / float(width), float(film.crop_height) / float(height)},
-          scale_(1 / (pixel_.x * pixel_.y)) {}
+          scale_(1 / (pixel_.x * pixel_.y)), sensor_(sensor.with_margin(in_whole(margin))) {}
 
     SensorRay sample_ray(Vec2 film, Vec2 u_lens) const override {
         return resized(sensor_->sample_ray(whole(film), u_lens));
@@ -38,8 +38,14 @@ public:
     float pdf_direction(Vec3 p, Vec3 d) const override {
         return sensor_->pdf_direction(p, d) * scale_;
     }
+    std::shared_ptr<const Sensor> with_margin(Vec2 margin) const override {
+        auto copy = std::make_shared<ResizedSensor>(*this);
+        copy->sensor_ = sensor_->with_margin(in_whole(margin));
+        return copy;
+    }
 
 private:
+    Vec2 in_whole(Vec2 margin) const { return {margin.x * pixel_.x, margin.y * pixel_.y}; }
     Vec2 whole(Vec2 film) const {
         return {origin_.x + film.x * pixel_.x, origin_.y + film.y * pixel_.y};
     }
@@ -56,16 +62,16 @@ private:
         return sample;
     }
 
-    std::shared_ptr<const Sensor> sensor_;
     Vec2 origin_, pixel_;  ///< A pixel's size in pixels of the whole film.
     float scale_;
+    std::shared_ptr<const Sensor> sensor_;
 };
 
 }  // namespace
 
-std::shared_ptr<const Sensor> make_resized(std::shared_ptr<const Sensor> sensor,
-                                           const FilmGeometry& film, int width, int height) {
-    return std::make_shared<ResizedSensor>(std::move(sensor), film, width, height);
+std::shared_ptr<const Sensor> make_resized(const Sensor& sensor, const FilmGeometry& film,
+                                           int width, int height, float margin) {
+    return std::make_shared<ResizedSensor>(sensor, film, width, height, Vec2{margin, margin});
 }
 
 }  // namespace etendue

@@ -7,9 +7,9 @@
 
 namespace etendue {
 
-/// `sensor`, of which a film of width × height pixels shows what the crop of `film` shows. Within the filter's radius of the
-/// edges, measurements are those of `sensor`.
-std::shared_ptr<const Sensor> make_resized(std::shared_ptr<const Sensor> sensor,
-                                           const FilmGeometry& film, int width, int height);
+/// `sensor`, of which a film of width × height pixels shows what the crop of `film` shows. Film points are measured up to
+/// `margin` of these pixels beyond it.
+std::shared_ptr<const Sensor> make_resized(const Sensor& sensor, const FilmGeometry& film,
+                                           int width, int height, float margin);
 
 }  // namespace etendue

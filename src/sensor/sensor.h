@@ -63,6 +63,8 @@ public:
     virtual Bounds3 lens_bounds() const { return {}; }
     /// SensorRay::pdf_dir of the direction `d` from the lens point `p`.
     virtual float pdf_direction(Vec3 p, Vec3 d) const = 0;
+    /// A copy that measures film points up to `margin` pixels beyond the crop, instead of the filter's radius.
+    virtual std::shared_ptr<const Sensor> with_margin(Vec2 margin) const = 0;
 };
 
 /// Arguments for the construction of sensors besides parameters.

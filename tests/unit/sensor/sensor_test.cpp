@@ -121,17 +121,20 @@ TEST_P(Sensors, MeasureWhatHitsALens) {
     }
 }
 
-/// A film of another size shows the same, with larger pixels.
+/// A film of another size shows the same, with larger pixels, and sees as far beyond its edges as the filter reaches.
 TEST_P(Sensors, CanHaveAFilmOfAnotherSize) {
     constexpr int kColumns = 9, kRows = 5;
     const FilmGeometry& g = GetParam().film;
     const std::shared_ptr<const Sensor> whole = make(GetParam());
-    const auto small = make_resized(whole, g, kColumns, kRows);
+    constexpr float kMargin = 1.5f;
+    const auto small = make_resized(*whole, g, kColumns, kRows, kMargin);
     const Vec2 pixel{float(g.crop_width) / kColumns, float(g.crop_height) / kRows};
     EXPECT_EQ(small->is_orthographic(), whole->is_orthographic());
     EXPECT_EQ(small->has_finite_lens(), whole->has_finite_lens());
     for (int i = 0; i < 1000; ++i) {
-        const Vec2 film{number() * kColumns, number() * kRows}, u = lens_numbers();
+        const Vec2 film{number() * (kColumns + 2 * kMargin) - kMargin,
+                        number() * (kRows + 2 * kMargin) - kMargin},
+            u = lens_numbers();
         const SensorRay ray = small->sample_ray(film, u);
         const SensorRay same = whole->sample_ray(
             {float(g.crop_x) + film.x * pixel.x, float(g.crop_y) + film.y * pixel.y}, u);
