@@ -52,18 +52,15 @@ bool ChainTracer::follow(Vec3d w, const ChainEvents& events) {
 }
 
 std::optional<Vec3d> ChainTracer::solve(Vec3d w, const ChainEvents& events, const ChainRay& ray,
-                                        const LampPoint& lamp) {
-    constexpr int kMostRays = 30;          // through the whole chain
+                                        const ChainTarget& target, int most_rays) {
     constexpr double kLongestStep = 0.25;  // radians
     constexpr double kLeastShare = 1.0 / 64;
     constexpr double kRounding = 1e-12;  // of miss()
-    Passing at = lamp.passed_by(ray);
+    Passing at = target.passed_by(ray);
     double share = 1;  // of the step
-    for (int i = 1; i < kMostRays; ++i) {
+    for (int i = 1; i < most_rays; ++i) {
         if (!(at.distance > 0)) return {};
-        const Matrix2& m = at.by_angles;
-        const double det = m.determinant();
-        double a = (at.y * m.a2 - at.x * m.b2) / det, b = (at.x * m.b1 - at.y * m.a1) / det;
+        auto [a, b] = at.step();
         const double size = std::hypot(a, b);
         if (!std::isfinite(size)) return {};
         // Where rays are focused, as at the edge of a caustic, a ray that hardly misses may still be far from the solution.
@@ -77,12 +74,12 @@ std::optional<Vec3d> ChainTracer::solve(Vec3d w, const ChainEvents& events, cons
         const bool follows = follow(next, events);
         if (is_last) {
             if (!follows) return {};
-            const Passing end = lamp.passed_by(ray_);
+            const Passing end = target.passed_by(ray_);
             const bool is_closer =
                 end.distance > 0 && end.miss() <= std::fmax(at.miss(), kRounding);
             return is_closer ? std::optional(next) : std::nullopt;
         }
-        const Passing there = follows ? lamp.passed_by(ray_) : at;
+        const Passing there = follows ? target.passed_by(ray_) : at;
         if (follows && there.distance > 0 && there.miss() < at.miss()) {
             w = next;
             at = there;
@@ -92,6 +89,12 @@ std::optional<Vec3d> ChainTracer::solve(Vec3d w, const ChainEvents& events, cons
         }
     }
     return {};
+}
+
+std::optional<Vec3d> ChainTracer::solve(Vec3d w, const ChainEvents& events,
+                                        const ChainTarget& target, int most_rays) {
+    if (!follow(w, events)) return {};
+    return solve(w, events, ChainRay(ray_), target, most_rays);
 }
 
 float ChainTracer::visibility_of(const LampPoint& lamp) const {
@@ -108,6 +111,19 @@ Rgb ChainTracer::transmittance_to(const LampPoint& lamp) const {
     return (lamp.is_infinite() ? scene_.attenuation_to_infinity(medium_, origin_, lamp.p)
                                : scene_.attenuation(medium_, origin_, lamp.ray_end())) *
            Tr;
+}
+
+bool KnownChain::pass(const Vertex& v, Vec3 toward) {
+    if (!may_be_in_chain(*v.shape)) return false;
+    const auto jet = scene_.jet(v.location, ray_.o, ray_.d, dot(Vec3d(v.p) - ray_.o, ray_.d));
+    const auto s = v.bsdf.sample_delta(toward, v.event, TransportMode::Radiance);
+    if (!jet || !s) return false;
+    ray_.arrive(*jet);
+    if (v.event % 2 == 0) {
+        ray_.reflect(*jet);
+        return true;
+    }
+    return ray_.refract(*jet, double(s->eta));
 }
 
 }  // namespace etendue

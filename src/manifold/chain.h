@@ -1,5 +1,5 @@
 #pragma once
-// Chains of delta events between a surface point and a point on a lamp. For fixed ends the chains that obey the laws of
+// Chains of delta events between a surface point and a target, mostly a point on a lamp. For fixed ends the chains that obey the laws of
 // reflection and refraction are isolated [Jakob & Marschner 2012]. Newton's method finds one of them: its unknowns are
 // the direction in which a ray leaves the surface point, and a step follows the ray through the same events.
 
@@ -26,6 +26,16 @@ struct ChainEvents {
     }
 };
 
+/// What a chain ends at.
+struct ChainTarget {
+    Vec3d p;  ///< At infinity the direction toward it.
+    bool is_infinite = false;
+
+    Passing passed_by(const ChainRay& ray) const {
+        return is_infinite ? passing_at_infinity(ray, p) : passing(ray, p);
+    }
+};
+
 /// y_0, drawn as light walks draw it without guide.
 struct LampPoint {
     const Emitter* emitter = nullptr;
@@ -36,6 +46,7 @@ struct LampPoint {
     double pdf = 0;  ///< With the probability of the choice of the emitter.
 
     bool is_infinite() const { return emitter->is_infinite(); }
+    ChainTarget target() const { return {Vec3d(p), is_infinite()}; }
     RayEnd ray_end() const {
         return emitter->is_area() ? RayEnd{p, ng, emitter->slack(prim)} : RayEnd{p};
     }
@@ -44,9 +55,7 @@ struct LampPoint {
         const Vec3 n = emitter->is_area() ? ng : w;
         return emitter->eval_emission(n, uv, prim, w).Le_cos;
     }
-    Passing passed_by(const ChainRay& ray) const {
-        return is_infinite() ? passing_at_infinity(ray, Vec3d(p)) : passing(ray, Vec3d(p));
-    }
+    Passing passed_by(const ChainRay& ray) const { return target().passed_by(ray); }
 };
 
 /// Follows rays from one surface point through delta events.
@@ -76,11 +85,14 @@ public:
 
     /// Follows the ray along `w` through all events; false where one of them is not met.
     bool follow(Vec3d w, const ChainEvents& events);
-    /// The direction near `w` whose ray passes through the lamp's point, behind the events; the tracer has followed it then. It
-    /// is a function of its arguments: found by one seed, it is found again by the same one. `ray`: the ray along `w` after its
-    /// events.
+    /// The direction near `w` whose ray passes through the target, behind the events; the tracer has followed it then. It is a
+    /// function of its arguments: found by one seed, it is found again by the same one. `ray`: the ray along `w` after its
+    /// events. `most_rays`: through the whole chain.
     std::optional<Vec3d> solve(Vec3d w, const ChainEvents& events, const ChainRay& ray,
-                               const LampPoint& lamp);
+                               const ChainTarget& target, int most_rays = 30);
+    /// The same, where `w` has not been followed yet.
+    std::optional<Vec3d> solve(Vec3d w, const ChainEvents& events, const ChainTarget& target,
+                               int most_rays);
     /// Transmittance of the edge from the last surface to the lamp, where the ray passes through its point: of masks, and
     /// of the medium. 0 where it is blocked.
     Rgb transmittance_to(const LampPoint& lamp) const;
@@ -102,13 +114,30 @@ private:
     ComponentArena arena_;
 };
 
+/// Follows a known chain of a path, vertex by vertex, without tracing it again.
+class KnownChain {
+public:
+    /// From the point `from`, along `w`.
+    KnownChain(const Scene& scene, Vec3 from, Vec3d w)
+        : scene_(scene), ray_(ChainRay::start(Vec3d(from), normalize(w))) {}
+
+    /// Goes on to `v`, and leaves it by its event; `toward` is the direction there toward the eye. False where chains may
+    /// not have it.
+    bool pass(const Vertex& v, Vec3 toward);
+    const ChainRay& ray() const { return ray_; }
+
+private:
+    const Scene& scene_;
+    ChainRay ray_;
+};
+
 /// Whether two directions of chains with the same ends and events are one solution.
 inline bool is_same_solution(Vec3d a, Vec3d b) {
     constexpr double kAngle = 1e-6;
     return dot(a - b, a - b) < kAngle * kAngle;
 }
 
-/// Newton's method ends where the ray misses the lamp by a smaller angle, seen from the last event, and the step of the first
+/// Newton's method ends where the ray misses the target by a smaller angle, seen from the last event, and the step of the first
 /// direction is smaller, too, in radians. One further step squares that.
 inline constexpr double kMissOfSolutions = 1e-7, kStepOfSolutions = 1e-8;
 

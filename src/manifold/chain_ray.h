@@ -4,6 +4,8 @@
 // half-vector constraints [Jakob & Marschner 2012; Zeltner et al. 2020]. In double, so that Newton's method converges to
 // far less than the distance of two solutions.
 
+#include <array>
+
 #include "geometry/surface_jet.h"
 
 namespace etendue {
@@ -42,6 +44,12 @@ struct Passing {
         distance;  ///< From the ray's origin; 1 at infinity. At most 0 where the point lies behind.
     Matrix2 by_angles;  ///< Derivative of (x, y) by the angles of the first direction.
 
+    /// Newton's step: the change of the first direction's angles after which the ray passes through the point, to first order.
+    std::array<double, 2> step() const {
+        const Matrix2& m = by_angles;
+        const double det = m.determinant();
+        return {(y * m.a2 - x * m.b2) / det, (x * m.b1 - y * m.a1) / det};
+    }
     /// Angle by which the ray misses the point, for small ones.
     double miss() const { return std::hypot(x, y) / distance; }
     /// Solid angle of first directions over the area that their rays cover, normal to themselves; at infinity over solid

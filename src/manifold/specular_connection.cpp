@@ -78,7 +78,7 @@ uint64_t count_trials(const Solution& found, const LampPoint& lamp, ChainSeeds& 
         ++work.stats.chain_trials;
         const auto seed = seeds.draw(sampler, &found.events);
         if (!seed || !(seed->events == found.events)) continue;
-        const auto w = tracer.solve(seed->w, seed->events, seed->ray, lamp);
+        const auto w = tracer.solve(seed->w, seed->events, seed->ray, lamp.target());
         if (w && is_same_solution(*w, found.w)) return n;
     }
     ++work.stats.runaways;
@@ -108,37 +108,11 @@ void record(const LampPoint& lamp, const Solution& found, ChainTracer& tracer, S
     }
 }
 
-/// Follows a known chain of a path, from its eye vertex to its lamp.
-class KnownChain {
-public:
-    /// `w`: direction of its first edge.
-    KnownChain(const Scene& scene, Vec3 from, Vec3 w)
-        : scene_(scene), ray_(ChainRay::start(Vec3d(from), normalize(Vec3d(w)))) {}
-
-    /// Goes on to `v`, and leaves it by its event; `toward` is the direction there toward the eye. False where chains may
-    /// not have it.
-    bool pass(const Vertex& v, Vec3 toward) {
-        if (!may_be_in_chain(*v.shape)) return false;
-        const auto jet = scene_.jet(v.location, ray_.o, ray_.d, dot(Vec3d(v.p) - ray_.o, ray_.d));
-        const auto s = v.bsdf.sample_delta(toward, v.event, TransportMode::Radiance);
-        if (!jet || !s) return false;
-        ray_.arrive(*jet);
-        if (v.event % 2 == 0) {
-            ray_.reflect(*jet);
-            return true;
-        }
-        return ray_.refract(*jet, double(s->eta));
-    }
-    /// Factor of the weight of a hit of the lamp there. `pdf`: density of the chain's first direction.
-    float rest_beside(const LampPoint& lamp, double pdf) const {
-        const double ratio = density_ratio(lamp, ray_, lamp.passed_by(ray_).jacobian(), pdf);
-        return float(1 - specular_weight(ratio));
-    }
-
-private:
-    const Scene& scene_;
-    ChainRay ray_;
-};
+/// Factor of the weight of a hit of the lamp behind a chain. `pdf`: density of the chain's first direction.
+float rest_beside(const LampPoint& lamp, const ChainRay& ray, double pdf) {
+    const double ratio = density_ratio(lamp, ray, lamp.passed_by(ray).jacobian(), pdf);
+    return float(1 - specular_weight(ratio));
+}
 
 }  // namespace
 
@@ -182,7 +156,7 @@ std::optional<Join> join_specular(const Scene& scene, const SubPath& z, int t,
     const float guess = luminance(from.beta * f * seed->guess) / float(lamp.pdf) * film_weight,
                 q_guess = std::fmax(kLeast, join_survival(kMargin * guess, limits.threshold));
     if (!(u_before < q_guess)) return {};
-    const auto w = tracer.solve(seed->w, seed->events, seed->ray, lamp);
+    const auto w = tracer.solve(seed->w, seed->events, seed->ray, lamp.target());
     if (!w) return {};
     auto found = evaluate(from, lamp, *w, seed->events, tracer);
     if (!found) return {};
@@ -216,14 +190,14 @@ float hit_beside_specular(const Scene& scene, const SubPath& z, int t, const Emi
     if (!is_left_to_hits(z, from + 1, counts)) return 1;
     const Vertex& end = z[last];
     // Directions of walks are more exact than differences of rounded positions.
-    KnownChain chain(scene, z[from].p, -z[from + 1].wo);
+    KnownChain chain(scene, z[from].p, Vec3d(-z[from + 1].wo));
     for (int i = from + 1; i < last; ++i)
         if (!chain.pass(z[i], z[i].wo)) return 1;
     const LampPoint lamp = lamp_point(end, emitter, end.wo);
     const Vertex& first = z[from + 1];
     const double pdf = double(first.pdf_fwd) * double(length2(first.p - z[from].p)) /
                        double(abs_dot(first.ng, first.wo));
-    return chain.rest_beside(lamp, pdf);
+    return rest_beside(lamp, chain.ray(), pdf);
 }
 
 float hit_lens_beside_specular(const Scene& scene, const SubPath& y, int s,
@@ -240,12 +214,13 @@ float hit_lens_beside_specular(const Scene& scene, const SubPath& y, int s,
         if (is_smooth_pair && counts.makes_smooth_pairs(is_last)) return 1;
     }
     const Vertex& y0 = y[0];
-    KnownChain chain(scene, y[from].p, y[from].wo);
+    KnownChain chain(scene, y[from].p, Vec3d(y[from].wo));
     for (int i = from - 1; i > 0; --i)
         if (!chain.pass(y[i], -y[i + 1].wo)) return 1;
     if (y0.emitter->is_delta()) return 0;
     const LampPoint lamp = lamp_point(y0, *y0.emitter, -y[1].wo);
-    return chain.rest_beside(lamp, double(y[from - 1].pdf_rev) / double(y[from].to_predecessor));
+    return rest_beside(lamp, chain.ray(),
+                       double(y[from - 1].pdf_rev) / double(y[from].to_predecessor));
 }
 
 }  // namespace etendue

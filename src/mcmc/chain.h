@@ -29,7 +29,7 @@ struct StepCounts {
 /// Statistics of the steps of one chain, or of several.
 struct ChainStats {
     static constexpr int kLengths = 16;    ///< Longer paths are counted with the last length.
-    static constexpr int kMutations = 10;  ///< 0: large steps, then StateSpace::mutations().
+    static constexpr int kMutations = 11;  ///< 0: large steps, then StateSpace::mutations().
 
     /// By mutation, and by the path length of x (for large steps, of y).
     std::array<std::array<StepCounts, kLengths>, kMutations> steps{};

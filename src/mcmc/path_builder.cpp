@@ -101,6 +101,15 @@ bool PathBuilder::step_eye(const BsdfSample& s) {
     return step<TransportMode::Radiance>(s);
 }
 
+void PathBuilder::append_chain_vertex(const Vertex& v) {
+    Vertex& added = work_.z.append();
+    added = v;
+    work_.z.arena.adopt(added.bsdf);
+    added.is_delta = true;
+    ++new_eye_;
+    is_joined_by_chain_ = true;
+}
+
 bool PathBuilder::start_light(const Emitter& emitter, const EmissionSample& e) {
     if (!keeps_light()) light_end_ = LightEnd::Sampled;
     start_light_path(walk_, emitter, e, sampler_, work_.y);
@@ -354,6 +363,7 @@ bool PathBuilder::finish(PathState& y) {
     const bool is_joined = light_end_ != LightEnd::Hit && eye_end_ != EyeEnd::Hit;
     if (is_joined) {
         for (const int i : {joint, joint + 1}) {
+            if (i > joint && is_joined_by_chain_) break;
             if (!y[i].v.is_connectible) return false;
             y[i].v.is_delta = false;
         }

@@ -54,6 +54,9 @@ public:
     /// Appends a vertex by a given event.
     bool step_light(const BsdfSample& s);
     bool step_eye(const BsdfSample& s);
+    /// Appends a delta event of a chain that ends at x_l, whose last edge no ray has tested. The chain follows the last vertex
+    /// that was walked to.
+    void append_chain_vertex(const Vertex& v);
     /// The vertices so far of the side of the light, and the last ones of both sides.
     int light_vertices() const { return work_.y.size(); }
     const Vertex& light_end() const { return work_.y[work_.y.size() - 1]; }
@@ -85,6 +88,8 @@ private:
     LightEnd light_end_;
     EyeEnd eye_end_;
     int new_light_ = 0, new_eye_ = 0;  ///< Vertices sampled so far.
+    bool is_joined_by_chain_ =
+        false;  ///< Whether the last eye vertex leads to x_l by a delta event.
     WalkContext walk_;
     Vec2 film_{};
     /// Vertices of Stream::Connection: the numbers for an emitter or a point on it, and for a lens point.

@@ -8,6 +8,7 @@
 #include "mcmc/mutation/caustic.h"
 #include "mcmc/mutation/eye_chain.h"
 #include "mcmc/mutation/lens_subpath.h"
+#include "mcmc/mutation/manifold.h"
 #include "mcmc/mutation/photon_map.h"
 #include "mcmc/mutation/user_path.h"
 
@@ -48,6 +49,7 @@ PathSpace::PathSpace(PathTarget target, const PathMutations& mutations, Techniqu
         std::make_unique<EyeChain>(EyeChain::Kind::Glossy, measure);
     mutations_[PathMutations::GlossyCaustic] =
         std::make_unique<CausticMutation>(Followed::Glossy, measure);
+    mutations_[PathMutations::Manifold] = std::make_unique<ManifoldMutation>(measure);
     mutations_[PathMutations::LensSubpath] = std::make_unique<LensSubpathMutation>();
     mutations_[PathMutations::PhotonMap] = std::make_unique<PhotonMapMutation>(target_.stores);
     if (target_.user.paths)

@@ -17,15 +17,16 @@ struct PathMutations {
         MultiChain,
         GlossyLens,
         GlossyCaustic,
+        Manifold,
         LensSubpath,
         UserPath,
         PhotonMap,
         kCount
     };
     static constexpr std::array<const char*, kCount> kNames{
-        "bidirectional",  "lens",         "caustic",   "multi_chain", "glossy_lens",
-        "glossy_caustic", "lens_subpath", "user_path", "photon_map"};
-    std::array<double, kCount> weights{1, 4, 4, 4, 4, 4, 0.5, 0, 0};
+        "bidirectional",  "lens",     "caustic",      "multi_chain", "glossy_lens",
+        "glossy_caustic", "manifold", "lens_subpath", "user_path",   "photon_map"};
+    std::array<double, kCount> weights{1, 4, 4, 4, 4, 4, 4, 0.5, 0, 0};
 };
 
 class PathSpace final : public StateSpace {

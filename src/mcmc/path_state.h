@@ -118,6 +118,10 @@ public:
     /// Density of x_i, i ≥ 1, after x_{i-1}, and of x_i, i < k, after x_{i+1}, if directions have density 1 per steradian.
     double geometry_from_light(int i) const { return geometry(i - 1, i) * met_from_light(i); }
     double geometry_from_eye(int i) const { return geometry(i + 1, i) * met_from_eye(i); }
+    /// Probability that a ray from x_{i+1} to x_i passes the masks of the edge and meets x_i.
+    double met_from_eye(int i) const {
+        return double(x_[size_t(i)].transmittance * x_[size_t(i)].opacity);
+    }
     Vec2 film{};
 
     void clear() {
@@ -161,12 +165,9 @@ private:
     PathDensity independent_path_density();
     /// Without masks.
     double geometry(int from, int to) const;
-    /// Probability that a ray from x_{i-1} to x_i, or from x_{i+1} to x_i, passes the masks of the edge and meets x_i.
+    /// Probability that a ray from x_{i-1} to x_i passes the masks of the edge and meets x_i.
     double met_from_light(int i) const {
         return double(x_[size_t(i) - 1].transmittance * x_[size_t(i)].opacity);
-    }
-    double met_from_eye(int i) const {
-        return double(x_[size_t(i)].transmittance * x_[size_t(i)].opacity);
     }
     double arrival(int i) const;
     void scatter(int i);

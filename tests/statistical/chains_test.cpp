@@ -133,6 +133,10 @@ std::vector<LongCase> long_cases() {
          front + room() + area_lamp() + sphere("-0.5,-0.6,0.2", "0.35", kRoughMetal) +
              "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.3,0.4,0.5\"/></emitter>"
              "<emitter type=\"point\"><point name=\"position\" value=\"0.4,0.8,0.6\"/></emitter>"},
+        {"lantern", front + room() + area_lamp("1,1,1") + sphere("-0.2,-0.3,0.1", "0.4", kGlass) +
+                        sphere("-0.15,-0.3,0.15", "0.1",
+                               "<emitter type=\"area\"><rgb name=\"radiance\" value=\"20\"/>"
+                               "</emitter>")},
         {"user_paths",
          mixed_room(front),
          {"mlt"},

@@ -167,7 +167,7 @@ TEST_P(Chains, SolutionsAreIsolated) {
         for (int k = 0; k < 1500; ++k) {
             const auto seed = seeds.draw(sampler);
             if (!seed) continue;
-            const auto w = tracer.solve(seed->w, seed->events, seed->ray, lamp);
+            const auto w = tracer.solve(seed->w, seed->events, seed->ray, lamp.target());
             if (!w) continue;
             ASSERT_TRUE(tracer.follow(*w, seed->events));
             EXPECT_LT(lamp.passed_by(tracer.ray()).miss(), kMissOfSolutions);
@@ -238,7 +238,7 @@ TEST(CausticEdge, SeedsEndAtSolutions) {
             for (int k = 0; k < 2000; ++k) {
                 const auto seed = seeds.draw(sampler);
                 if (!seed || !(seed->events == through)) continue;
-                const auto w = tracer.solve(seed->w, seed->events, seed->ray, lamp);
+                const auto w = tracer.solve(seed->w, seed->events, seed->ray, lamp.target());
                 if (!w) continue;
                 ++ends;
                 ASSERT_TRUE(tracer.follow(*w, through));
@@ -267,7 +267,7 @@ double jacobian(const Scene& scene, Vec3 at, const LampPoint& lamp, int count) {
     for (int k = 0; k < 10000; ++k) {
         const auto seed = seeds.draw(sampler);
         if (!seed || seed->events.count != count) continue;
-        const auto w = tracer.solve(seed->w, seed->events, seed->ray, lamp);
+        const auto w = tracer.solve(seed->w, seed->events, seed->ray, lamp.target());
         if (w && tracer.follow(*w, seed->events)) return lamp.passed_by(tracer.ray()).jacobian();
     }
     return 0;
