@@ -218,9 +218,9 @@ public:
         mutations_.weights[PathMutations::Bidirectional] = 3;
         for (const auto kind :
              {PathMutations::Lens, PathMutations::Caustic, PathMutations::MultiChain,
-              PathMutations::GlossyLens, PathMutations::GlossyCaustic, PathMutations::Manifold,
-              PathMutations::LensSubpath})
+              PathMutations::GlossyLens, PathMutations::GlossyCaustic, PathMutations::LensSubpath})
             mutations_.weights[kind] = 1;
+        mutations_.weights[PathMutations::Manifold] = 0;  // keeps the light side
         mutations_.weights[PathMutations::PhotonMap] = 2;
         if (user_paths) {
             user_ = {*user_paths, user_share};

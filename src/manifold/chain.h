@@ -1,6 +1,6 @@
 #pragma once
-// Chains of delta events between a surface point and a target, mostly a point on a lamp. For fixed ends the chains that obey the laws of
-// reflection and refraction are isolated [Jakob & Marschner 2012]. Newton's method finds one of them: its unknowns are
+// Chains of delta events between a surface point and a target, mostly a point on a lamp. For fixed ends the chains that obey the
+// laws of reflection and refraction are isolated [Jakob & Marschner 2012]. Newton's method finds one of them: its unknowns are
 // the direction in which a ray leaves the surface point, and a step follows the ray through the same events.
 
 #include <array>
