@@ -106,7 +106,8 @@ public:
     void add_specular(const SampleContext& c, const TechniqueCounts& counts, int t,
                       Workspace& work) const {
         if (counts.specular_depth > 0)
-            specular_.add(c, t, depth_.max_depth, threshold(c), counts, work);
+            specular_.add(c, t, depth_.max_depth, threshold(c), is_optimised_ ? 0 : roulette_,
+                          counts, work);
     }
 
     /// Adds the join, times `factor`, if it exists and passes test(), whose result is returned. If z_{t-1} has several

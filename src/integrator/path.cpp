@@ -48,7 +48,8 @@ public:
                 if (const float Tr = visibility(c.scene, *j, work.stats); Tr > 0)
                     c.sink.add(*j, j->contribution * Tr);
             if (counts.specular_depth > 0)
-                specular_.add(c, t, depth_.max_depth, threshold(c), counts, work);
+                specular_.add(c, t, depth_.max_depth, roulette_ * c.expected_of_pixel(), roulette_,
+                              counts, work);
         }
     }
 
@@ -70,10 +71,6 @@ public:
     Estimator estimator() const override { return Estimator::Unbiased; }
 
 private:
-    float threshold(const SampleContext& c) const {
-        return roulette_ > 0 ? roulette_ * c.expected_of_pixel() : 0;
-    }
-
     DepthOptions depth_;
     Guiding guiding_;
     Specular specular_;

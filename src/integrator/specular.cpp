@@ -1,7 +1,6 @@
 #include "integrator/specular.h"
 
 #include "integrator/seed_photon_walks.h"
-#include "integrator/specular_pilot.h"
 
 namespace etendue {
 
@@ -37,23 +36,23 @@ void Specular::prepare(const PassContext& pass, const DepthOptions& depth, Techn
     const bool is_pilot = pilots_ != nullptr;
     SpecularPilots own;
     SpecularPilots& pilots = is_pilot ? *pilots_ : own;
-    if (!pilots.photons && (is_pilot || mode_ == Mode::Auto))
-        pilots.photons = photons(kWalksOfPilot);
-    if (mode_ == Mode::Auto) {
+    if (!pilots.photons) pilots.photons = photons(kWalksOfPilot);
+    auto known = pilots.by_method.find(method_);
+    if (known == pilots.by_method.end()) {
         counts.specular_depth = depth_;
-        auto known = pilots.is_worthwhile.find(method_);
-        if (known == pilots.is_worthwhile.end()) {
-            const SpecularPilot pilot = run_specular_pilot(pass, depth, counts, *pilots.photons);
-            known = pilots.is_worthwhile.emplace(method_, pilot.is_worthwhile()).first;
-        }
-        is_used_ = known->second;
+        known = pilots.by_method
+                    .emplace(method_, run_specular_pilot(pass, depth, counts, *pilots.photons))
+                    .first;
     }
+    luminance_ = float(known->second.luminance);
+    if (mode_ == Mode::Auto) is_used_ = known->second.is_worthwhile();
     if (is_used_) photons_ = is_pilot ? pilots.photons : photons(kWalks);
 }
 
 void Specular::save(LearnedState& to) const {
     if (mode_ == Mode::Off) return;
     to.put(is_used_);
+    to.put(luminance_);
     to.put(photons_ != nullptr);
     if (photons_) photons_->save(to);
 }
@@ -62,6 +61,7 @@ void Specular::load(LearnedState& from) {
     if (mode_ == Mode::Off) return;
     bool has_photons = false;
     from.get(is_used_);
+    from.get(luminance_);
     from.get(has_photons);
     if (!has_photons) return;
     SeedPhotons photons;

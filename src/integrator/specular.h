@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "integrator/integrator.h"
+#include "integrator/specular_pilot.h"
 #include "manifold/specular_connection.h"
 
 namespace etendue {
@@ -11,7 +12,7 @@ namespace etendue {
 /// What the pilots of `auto` prepare once for all of them. Not for two renderings at a time.
 struct SpecularPilots {
     std::shared_ptr<const SeedPhotons> photons;
-    std::map<std::string, bool> is_worthwhile;  ///< By method.
+    std::map<std::string, SpecularPilot> by_method;
 };
 
 /// Specular connections as an option of integrators.
@@ -50,11 +51,13 @@ public:
         if (counts.specular_depth > 0)
             hit.mis_weight *= hit_lens_beside_specular(scene, y, s, counts);
     }
-    /// Adds X(s,t) of z_{t-1}, where the counts have any. `threshold`: as SpecularLimits::threshold.
-    void add(const SampleContext& c, int t, int max_depth, float threshold,
+    /// Adds X(s,t) of z_{t-1}, where the counts have any. `threshold`: as SpecularLimits::threshold; where it is 0, because
+    /// nothing is known of the pixel yet, it is `roulette` times the image's mean in the pilot.
+    void add(const SampleContext& c, int t, int max_depth, float threshold, float roulette,
              const TechniqueCounts& counts, Workspace& work) const {
-        const SpecularLimits limits{
-            .max_depth = max_depth, .threshold = threshold, .photons = photons_.get()};
+        const SpecularLimits limits{.max_depth = max_depth,
+                                    .threshold = threshold > 0 ? threshold : roulette * luminance_,
+                                    .photons = photons_.get()};
         if (const auto j = join_specular(c.scene, work.z, t, limits, c.sampler, counts, work))
             c.sink.add(*j, j->contribution);
     }
@@ -64,6 +67,7 @@ private:
     Mode mode_ = Mode::Off;
     bool is_used_ = false;
     int depth_ = 0;
+    float luminance_ = 0;  ///< Mean of the image in the pilot.
     std::shared_ptr<const SeedPhotons> photons_;
     std::string method_;
     std::shared_ptr<SpecularPilots> pilots_;  ///< Null in renderings that are no pilots.

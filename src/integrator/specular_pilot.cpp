@@ -127,9 +127,11 @@ SpecularPilot run_specular_pilot(const PassContext& pass, const DepthOptions& de
         sum.chain_rays += b.chain_rays;
     }
     SpecularPilot result;
+    double walks = 0;
     result.rays_without = sum.rays_without;
     result.rays_with = sum.rays_without + kChainRay * sum.chain_rays;
     for (const TileSums& t : sum.tiles) {
+        walks += t.walks;
         if (!(t.light > 0)) continue;
         const double relative = sqr(t.walks / t.light);
         result.light += t.light;
@@ -138,6 +140,7 @@ SpecularPilot run_specular_pilot(const PassContext& pass, const DepthOptions& de
         result.moment_with += relative * t.moment_with;
         result.moment_of_hits += relative * t.moment_of_hits;
     }
+    result.luminance = walks > 0 ? result.light / walks : 0;
     return result;
 }
 

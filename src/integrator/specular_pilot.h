@@ -8,6 +8,8 @@ namespace etendue {
 
 /// Result of run_specular_pilot(): sums over the walks.
 struct SpecularPilot {
+    double luminance =
+        0;  ///< Mean of the image, without what the connections of two sub-paths would add.
     double light = 0;  ///< Contributions.
     double light_of_none =
         0;  ///< Of these, what nothing else makes: light of lamps without extent.

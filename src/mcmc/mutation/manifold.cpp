@@ -62,13 +62,16 @@ std::optional<Solution> solution(const Scene& scene, const PathState& x, const P
     return s;
 }
 
-/// The first direction of the chain as the solver finds it: a step of Newton's method squares the error of rounding.
-std::optional<Vec3d> refined(const Solution& s) {
+/// The first direction of the chain as the solver finds it: a step of Newton's method squares the error of rounding. Empty where
+/// that is too large.
+std::optional<Vec3d> refined(const Scene& scene, const PathState& x, const Part& part) {
     constexpr double kRounding = 1e-4;
-    const auto [a, b] = s.passing.step();
+    const auto s = solution(scene, x, part);
+    if (!s) return {};
+    const auto [a, b] = s->passing.step();
     if (!(std::hypot(a, b) < kRounding)) return {};
-    const TangentBasis basis(s.w);
-    return normalize(s.w + basis.s * a + basis.t * b);
+    const TangentBasis basis(s->w);
+    return normalize(s->w + basis.s * a + basis.t * b);
 }
 
 /// Density of the chain's vertices in the measure of paths, where they are determined by the ends; 0 where it is not known.
@@ -128,10 +131,10 @@ bool ManifoldMutation::propose(const PathState& x, const MutationContext& c, Pat
     }
     if (!builder.finish(y)) return false;
 
+    // Where the vertices are too coarse to tell the chain, nothing leads back.
+    const auto w_new = refined(scene_, y, part), w_old = refined(scene_, x, part);
+    if (!w_old || !w_new || !is_same_solution(*w_new, *w)) return false;
     // Back, by the same rule.
-    const auto old = solution(scene_, x, part);
-    const auto w_old = old ? refined(*old) : std::nullopt;
-    if (!w_old) return false;
     ChainTracer back(scene_, x[part.m].v, c.chain.work.stats);
     const auto again =
         back.solve(exact_direction(x[part.m].v, y[part.m - 1].v), events, target, kMostRays);
