@@ -94,7 +94,7 @@ TEST(SpecularOption, FindsChainsByPhotons) {
               "value=\"true\"/><transform "
               "name=\"to_world\"><scale value=\"0.4\"/><translate y=\"0.2\"/></transform>" +
               kGlass + "</shape>" + point_light("0.2,0.9,0.1"));
-    const RenderStats stats = render(scene, "path:specular_connections=on").stats;
+    const RenderStats stats = render(scene, "path:specular_connections=on,roulette=0").stats;
     EXPECT_GT(stats.chains, 100u);
     EXPECT_LT(double(stats.chain_trials) / double(stats.chains), 10);
 }
