@@ -5,9 +5,9 @@
 //
 // Techniques: C(0,t), C(s,1), C(s,0) as in bdpt; C(s,t) with s, t ≥ 2 from the stored vertices; C(1,t) from their y_0,
 // from next events, or from both; specular connections X(s,t). Unbiased. All eye paths of a pass share the M light paths, so
-// the errors of M samples of a connection are correlated. The weights therefore count them as 1 (`upper`) [eq. 16-17], or as M, as if they were
-// independent (`standard`). The weights contain neither K nor the mass function, because these are not defined for
-// paths of other techniques.
+// the errors of M samples of a connection are correlated. The weights therefore count them as 1 (`upper`) [eq. 16-17], or as
+// M, as if they were independent (`standard`). The weights contain neither K nor the mass function, because these are not
+// defined for paths of other techniques.
 
 #include "integrator/pcbpt.h"
 

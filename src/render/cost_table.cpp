@@ -9,8 +9,8 @@ namespace {
 /// Costs of what is counted, in seconds; fitted by bench/method-costs.
 constexpr double kLightPath = 0.03e-6, kWalkRay = 0.36e-6, kShadowRay = 0.28e-6, kPair = 0.16e-6,
                  kTrialRay = 1.23e-6, kChainRay = 0.60e-6;
-/// The same counters cost so much more where directions at surfaces are guided: 1.3 to 1.9 times on six scenes. Where only emission is
-/// guided, they cost up to a fifth more.
+/// The same counters cost so much more where directions at surfaces are guided: 1.3 to 1.9 times on six scenes. Where only
+/// emission is guided, they cost up to a fifth more.
 constexpr double kGuided = 1.6;
 
 struct MethodCost {
