@@ -185,7 +185,7 @@ void load_images(const SceneDescription& description) {
 
 void build_hierarchy(const Scene& scene) {
     Accelerator accelerator;
-    for (const SceneShape& s : scene.shapes()) accelerator.add_shape(*s.shape);
+    for (const SceneShape& s : scene.shapes()) accelerator.add_shape({s.shape});
     accelerator.commit();
 }
 

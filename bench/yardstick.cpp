@@ -33,7 +33,7 @@ TriangleMesh make_room() {
 
 Accelerator make_accelerator(const TriangleMesh& mesh) {
     Accelerator accelerator;
-    accelerator.add_shape(mesh);
+    accelerator.add_shape({&mesh});
     accelerator.commit();
     return accelerator;
 }
@@ -60,7 +60,7 @@ void Yardstick::trace_path(uint64_t index) const {
         // A square lamp in the upper half.
         const Vec3 lamp{0.4f * (u_lamp.x - 0.5f), 1.2f, 0.4f * (u_lamp.y - 0.5f)};
         const Vec3 o = offset_origin({g.p, n, g.slack}, n);
-        accelerator_.occluded({o, lamp - o, 1});
+        accelerator_.obstacle({o, lamp - o, 1});
         const Vec3 wi = sample_cosine_hemisphere(sampler.next_2d());
         ray = {o, Frame::from_normal(n).to_world(wi), kInf};
     }

@@ -45,8 +45,9 @@ void occluded_rays(const ScenePtr& handle, const Rows<const float, 3>& o,
     for_each_row(occluded.size(), [&](size_t i) {
         const Ray ray{row(o, i), row(d, i), tmax.data()[i]};
         SurfaceHit hit;
-        occluded.data()[i] =
-            scene.has_masks() ? intersect(scene, ray, hit) : scene.accelerator().occluded(ray);
+        occluded.data()[i] = scene.has_masks()
+                                 ? intersect(scene, ray, hit)
+                                 : scene.accelerator().obstacle(ray) != Obstacle::None;
     });
 }
 

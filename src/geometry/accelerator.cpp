@@ -8,6 +8,7 @@
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 
 #include "geometry/ray_tracer.h"
 #include "system/available_memory.h"
@@ -65,11 +66,40 @@ void intersect_callback(const RTCIntersectFunctionNArguments* args) {
     rayhit->hit.instID[0] = args->context->instID[0];
 }
 
+#if RTC_VERSION_MAJOR >= 4
+using QueryContext = RTCRayQueryContext;
+#else
+using QueryContext = RTCIntersectContext;
+#endif
+
+/// A query for obstacles; callbacks get its context.
+struct ObstacleQuery {
+    QueryContext context;
+    bool meets_passable = false;
+};
+static_assert(std::is_standard_layout_v<ObstacleQuery>);
+
+void note_passable(QueryContext* context) {
+    reinterpret_cast<ObstacleQuery*>(context)->meets_passable = true;
+}
+
+/// Rejects the hit: beyond it, there may be an opaque one.
+void passable_filter(const RTCFilterFunctionNArguments* args) {
+    if (!args->valid[0]) return;
+    note_passable(args->context);
+    args->valid[0] = 0;
+}
+
+template <bool is_passable>
 void occluded_callback(const RTCOccludedFunctionNArguments* args) {
     if (!args->valid[0]) return;
     auto* ray = reinterpret_cast<RTCRay*>(args->ray);
     AnalyticShape::Hit hit;
-    if (intersect_analytic(*static_cast<const AnalyticShape*>(args->geometryUserPtr), *ray, hit))
+    if (!intersect_analytic(*static_cast<const AnalyticShape*>(args->geometryUserPtr), *ray, hit))
+        return;
+    if constexpr (is_passable)
+        note_passable(args->context);
+    else
         ray->tfar = -kInf;
 }
 
@@ -159,7 +189,7 @@ struct Device {
 struct Part {
     std::shared_ptr<Device> device;
     RTCScene scene = nullptr;
-    std::vector<const Shape*> shapes;  ///< Of a group.
+    std::vector<Accelerator::Member> members;  ///< Of a group.
     int64_t bytes = 0;
 
     Part(std::shared_ptr<Device> on, bool is_watertight) : device(std::move(on)) {
@@ -181,8 +211,8 @@ struct Accelerator::Impl {
     std::shared_ptr<Part> part;  ///< With the shapes and instances of the scene itself.
     RTCScene top = nullptr;
     std::vector<std::shared_ptr<const Part>> groups;
-    /// Those of an earlier accelerator, by their shapes.
-    std::map<std::vector<const Shape*>, std::shared_ptr<const Part>> earlier_groups;
+    /// Those of an earlier accelerator, by their members.
+    std::map<std::vector<Member>, std::shared_ptr<const Part>> earlier_groups;
     std::vector<std::pair<uint32_t, uint32_t>> group_shapes;  ///< Indices [first, second).
     /// By geometry id of the top-level scene: index of the shape, or of the instance.
     std::vector<uint32_t> shape_of_geom;
@@ -211,7 +241,8 @@ struct Accelerator::Impl {
                 : "Embree: error " + std::to_string(int(error)));
     }
 
-    uint32_t attach(RTCScene scene, const Shape& shape) const {
+    uint32_t attach(RTCScene scene, const Member& member) const {
+        const Shape& shape = *member.shape;
         RTCGeometry geometry;
         if (const auto* mesh = dynamic_cast<const TriangleMesh*>(&shape)) {
             geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -225,6 +256,8 @@ struct Accelerator::Impl {
                                        mesh->vertices().size());
             rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                        mesh->faces().data(), 0, sizeof(Face), mesh->faces().size());
+            if (member.may_let_rays_pass)
+                rtcSetGeometryOccludedFilterFunction(geometry, passable_filter);
         } else {
             geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
             rtcSetGeometryUserPrimitiveCount(geometry, 1);
@@ -232,7 +265,9 @@ struct Accelerator::Impl {
                 geometry, const_cast<AnalyticShape*>(dynamic_cast<const AnalyticShape*>(&shape)));
             rtcSetGeometryBoundsFunction(geometry, bounds_callback, nullptr);
             rtcSetGeometryIntersectFunction(geometry, intersect_callback);
-            rtcSetGeometryOccludedFunction(geometry, occluded_callback);
+            rtcSetGeometryOccludedFunction(geometry, member.may_let_rays_pass
+                                                         ? occluded_callback<true>
+                                                         : occluded_callback<false>);
         }
         rtcCommitGeometry(geometry);
         const uint32_t id = rtcAttachGeometry(scene, geometry);
@@ -249,29 +284,30 @@ Accelerator::Accelerator(const AcceleratorOptions& options, const Accelerator& e
     : impl_(std::make_shared<Impl>(options, earlier.impl_->shared)) {
     if (options.is_watertight == earlier.impl_->options.is_watertight)
         for (const auto& group : earlier.impl_->groups)
-            impl_->earlier_groups.emplace(group->shapes, group);
+            impl_->earlier_groups.emplace(group->members, group);
 }
 
-uint32_t Accelerator::add_shape(const Shape& shape) {
-    const uint32_t id = impl_->attach(impl_->top, shape);
+uint32_t Accelerator::add_shape(const Member& member) {
+    const uint32_t id = impl_->attach(impl_->top, member);
     impl_->shape_of_geom.resize(id + 1);
-    impl_->analytic.push_back(dynamic_cast<const AnalyticShape*>(&shape));
+    impl_->analytic.push_back(dynamic_cast<const AnalyticShape*>(member.shape));
     return impl_->shape_of_geom[id] = impl_->shape_count++;
 }
 
-uint32_t Accelerator::add_group(const std::vector<const Shape*>& shapes) {
-    for (const Shape* s : shapes) impl_->analytic.push_back(dynamic_cast<const AnalyticShape*>(s));
+uint32_t Accelerator::add_group(const std::vector<Member>& members) {
+    for (const Member& m : members)
+        impl_->analytic.push_back(dynamic_cast<const AnalyticShape*>(m.shape));
     const uint32_t first = impl_->shape_count;
-    impl_->shape_count += uint32_t(shapes.size());
+    impl_->shape_count += uint32_t(members.size());
     impl_->group_shapes.emplace_back(first, impl_->shape_count);
-    const auto known = impl_->earlier_groups.find(shapes);
+    const auto known = impl_->earlier_groups.find(members);
     if (known != impl_->earlier_groups.end()) {
         impl_->groups.push_back(known->second);
     } else {
         const int64_t before = impl_->shared->memory.bytes;
         auto group = std::make_shared<Part>(impl_->shared, impl_->options.is_watertight);
-        group->shapes = shapes;
-        for (const Shape* s : shapes) impl_->attach(group->scene, *s);  // ids count from 0
+        group->members = members;
+        for (const Member& m : members) impl_->attach(group->scene, m);  // ids count from 0
         rtcCommitScene(group->scene);
         impl_->check();
         group->bytes = impl_->shared->memory.bytes - before;
@@ -338,17 +374,23 @@ bool Accelerator::intersect(const Ray& ray, RayHit& out) const {
     return true;
 }
 
-bool Accelerator::occluded(const Ray& ray) const {
+Obstacle Accelerator::obstacle(const Ray& ray) const {
     RTCRay r;
     set_ray(ray, r);
+    ObstacleQuery query;
 #if RTC_VERSION_MAJOR >= 4
-    rtcOccluded1(impl_->top, &r, nullptr);
+    rtcInitRayQueryContext(&query.context);
+    RTCOccludedArguments arguments;
+    rtcInitOccludedArguments(&arguments);
+    arguments.context = &query.context;
+    rtcOccluded1(impl_->top, &r, &arguments);
 #else
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    rtcOccluded1(impl_->top, &context, &r);
+    rtcInitIntersectContext(&query.context);
+    rtcOccluded1(impl_->top, &query.context, &r);
 #endif
-    return r.tfar < 0;
+    return r.tfar < 0             ? Obstacle::Opaque
+           : query.meets_passable ? Obstacle::Passable
+                                  : Obstacle::None;
 }
 
 size_t Accelerator::instance_count() const {

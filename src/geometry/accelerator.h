@@ -28,6 +28,13 @@ struct RayHit : SurfaceLocation {
 /// Memory that is free, or what the process may use of it if that is less.
 size_t memory_of_machine();
 
+/// What a ray meets.
+enum class Obstacle : uint8_t {
+    None,
+    Passable,  ///< Shapes that may let it pass, and no others.
+    Opaque,
+};
+
 struct AcceleratorOptions {
     /// Lets no ray pass between adjacent triangles. Otherwise about one ray in millions does, where it meets an edge to
     /// within rounding, and rays are 10 to 20 % faster.
@@ -49,23 +56,29 @@ public:
         std::pair<uint32_t, uint32_t> shapes;  ///< Indices [first, second) of what it shows.
     };
 
+    struct Member {
+        const Shape* shape;              ///< Must outlive the accelerator.
+        bool may_let_rays_pass = false;  ///< See obstacle().
+        auto operator<=>(const Member&) const = default;
+    };
+
     explicit Accelerator(const AcceleratorOptions& options = {});
-    /// One that takes the hierarchies of groups of the same shapes from an earlier one with the same options.
+    /// One that takes the hierarchies of groups of the same members from an earlier one with the same options.
     Accelerator(const AcceleratorOptions& options, const Accelerator& earlier);
 
-    /// The shape must outlive the accelerator. Returns its index.
-    uint32_t add_shape(const Shape& shape);
+    /// Returns the index of the shape.
+    uint32_t add_shape(const Member& member);
     /// Adds shapes that are visible only through instances; they take the next shape indices. Returns the group's
     /// index.
-    uint32_t add_group(const std::vector<const Shape*>& shapes);
+    uint32_t add_group(const std::vector<Member>& members);
     uint32_t add_instance(uint32_t group, const Transform& to_world);
     /// Builds the hierarchy; throws std::runtime_error where Embree fails.
     void commit();
 
     /// The nearest intersection with t in (0, ray.tmax); false where there is none.
     bool intersect(const Ray& ray, RayHit& hit) const;
-    /// Whether there is any intersection with t in (0, ray.tmax).
-    bool occluded(const Ray& ray) const;
+    /// What there is with t in (0, ray.tmax).
+    Obstacle obstacle(const Ray& ray) const;
 
     size_t instance_count() const;
     const Instance& instance(uint32_t index) const;

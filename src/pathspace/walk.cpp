@@ -72,9 +72,13 @@ bool next_is_fixed_by_film(const Vertex& v, bool is_delta, const Scene& scene) {
 void trace(const WalkContext& walk, Sampler& sampler, SubPath& path, Step& step) {
     const Scene& scene = walk.scene;
     ++walk.stats.walk_rays;
-    const float u = sampler.next_1d_if(scene.has_masks());
+    // The number that decides at masks is the last one of its block. A chain in primary sample space keeps it for all rays.
+    std::optional<float> known;
+    if (scene.has_masks() && sampler.kind() == SamplerKind::PrimarySample)
+        known = sampler.next_1d();
+    const auto number = [&sampler, known] { return known ? *known : sampler.next_1d(); };
     Passage passage{step.medium};
-    step.found = scene.find(step.ray, u, step.hit, passage);
+    step.found = scene.find(step.ray, number, step.hit, passage);
     Flight& flight = path.flight;  // by member: a vector copy stalls on stores of members
     flight.o = step.ray.o;
     flight.d = step.ray.d;

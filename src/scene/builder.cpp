@@ -324,10 +324,13 @@ private:
 
     void finish_geometry() {
         scene_.shapes_ = top_;
-        for (const SceneShape& s : top_) layout_.top.push_back(s.shape);
+        const auto member = [](const SceneShape& s) {
+            return Accelerator::Member{s.shape, !s.material->is_opaque()};
+        };
+        std::ranges::transform(top_, std::back_inserter(layout_.top), member);
         for (const auto& group : groups_) {
-            std::vector<const Shape*>& shapes = layout_.groups.emplace_back();
-            for (const SceneShape& s : group) shapes.push_back(s.shape);
+            std::ranges::transform(group, std::back_inserter(layout_.groups.emplace_back()),
+                                   member);
             scene_.shapes_.insert(scene_.shapes_.end(), group.begin(), group.end());
         }
         for (const auto& [group, to_world] : instances_)
@@ -365,9 +368,9 @@ private:
         if (earlier_ && earlier_->layout == layout_) return *earlier_->accelerator;
         Accelerator a = earlier_ ? Accelerator(options_.accelerator, *earlier_->accelerator)
                                  : Accelerator(options_.accelerator);
-        for (const Shape* s : layout_.top) a.add_shape(*s);
+        for (const Accelerator::Member& m : layout_.top) a.add_shape(m);
         std::vector<uint32_t> ids;
-        for (const auto& shapes : layout_.groups) ids.push_back(a.add_group(shapes));
+        for (const auto& members : layout_.groups) ids.push_back(a.add_group(members));
         for (const auto& [group, to_world] : layout_.instances)
             a.add_instance(ids[group], to_world);
         a.commit();

@@ -25,8 +25,8 @@ struct BuiltShape {
 
 /// Which shapes the accelerator has, and where.
 struct AcceleratorLayout {
-    std::vector<const Shape*> top;
-    std::vector<std::vector<const Shape*>> groups;
+    std::vector<Accelerator::Member> top;
+    std::vector<std::vector<Accelerator::Member>> groups;
     std::vector<std::pair<size_t, Transform>> instances;  ///< Of groups, by index.
     bool is_watertight = false;
 

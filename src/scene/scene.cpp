@@ -186,19 +186,19 @@ void Scene::complete(SurfaceHit& hit) const {
 }
 
 template <class Stops, class Passes>
-float Scene::for_each_surface(Ray ray, const Stops& stops, const Passes& passes) const {
+float Scene::for_each_surface(Ray ray, SurfaceHit& hit, const Stops& stops,
+                              const Passes& passes) const {
     const bool is_segment = ray.tmax < kInf;
     const Vec3 end = is_segment ? ray.o + ray.d * ray.tmax : Vec3();
-    SurfaceHit hit;
     float length_d = length(ray.d);
     float skipped =
         0;  // distance from the last surface to the ray's origin, which is offset from it
     const auto rest = [&] { return ray.tmax * length_d + skipped; };
     while (ray.tmax > 0 && locate(ray, hit)) {
         hit.t = hit.t * length_d + skipped;
-        if (stops(hit)) return rest();
+        if (stops()) return rest();
         complete(hit);
-        if (!passes(hit)) return rest();
+        if (!passes()) return rest();
         const Vec3 p = hit.geometry.p, o = offset_origin(ray_end(hit.geometry), ray.d);
         skipped = dot(o - p, ray.d) / length_d;
         ray.o = o;
@@ -213,7 +213,8 @@ float Scene::for_each_surface(Ray ray, const Stops& stops, const Passes& passes)
 }
 
 bool Scene::intersect(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const {
-    const bool found = find(ray, u, hit, passage);
+    const bool found = find(
+        ray, [u] { return u; }, hit, passage);
     if (found) complete(hit);
     return found;
 }
@@ -237,22 +238,16 @@ bool Scene::find_where(const Ray& ray, const Stops& stops, SurfaceHit& hit,
     bool found = false;
     // Geometry is needed where a surface may let the ray pass.
     for_each_surface(
-        ray,
-        [&](const SurfaceHit& next) {
-            travelled += next.t;
-            passage.attenuation *= attenuation(passage.medium, next.t);
-            found = is_opaque(next);
-            if (found) hit = next;
-            return found;
+        ray, hit,
+        [&] {
+            travelled += hit.t;
+            passage.attenuation *= attenuation(passage.medium, hit.t);
+            return found = is_opaque(hit);
         },
-        [&](const SurfaceHit& next) {
-            found = stops(opacity_of(*next.shape, next.geometry));
-            if (found) {
-                hit = next;
-                return false;
-            }
-            passage.medium = medium_beyond(next, ray.d, passage.medium);
-            return true;
+        [&] {
+            found = stops(opacity_of(*hit.shape, hit.geometry));
+            if (!found) passage.medium = medium_beyond(hit, ray.d, passage.medium);
+            return !found;
         });
     if (found)
         hit.t = travelled;
@@ -261,10 +256,13 @@ bool Scene::find_where(const Ray& ray, const Stops& stops, SurfaceHit& hit,
     return found;
 }
 
-bool Scene::find(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const {
+bool Scene::find(const Ray& ray, const std::function<float()>& number, SurfaceHit& hit,
+                 Passage& passage) const {
+    std::optional<float> u;
     const auto stops = [&](float opacity) {
-        if (u < opacity) return true;
-        u = std::min((u - opacity) / (1 - opacity), kOneMinusEpsilon);
+        if (!u) u = number();
+        if (*u < opacity) return true;
+        u = std::min((*u - opacity) / (1 - opacity), kOneMinusEpsilon);
         return false;
     };
     return find_where(ray, stops, hit, passage);
@@ -289,13 +287,14 @@ bool Scene::intersect(const Ray& ray, float u, SurfaceHit& hit) const {
 
 float Scene::masked_transmittance(const Ray& ray) const {
     float Tr = 1;
+    SurfaceHit hit;
     for_each_surface(
-        ray,
-        [&](const SurfaceHit& hit) {
+        ray, hit,
+        [&] {
             if (is_opaque(hit)) Tr = 0;
             return Tr == 0;
         },
-        [&](const SurfaceHit& hit) {
+        [&] {
             Tr *= 1 - opacity_of(*hit.shape, hit.geometry);
             return Tr > 0;
         });
@@ -304,13 +303,14 @@ float Scene::masked_transmittance(const Ray& ray) const {
 
 Rgb Scene::attenuation(MediumId medium, const Ray& ray) const {
     Rgb product(1);
+    SurfaceHit hit;
     const float rest = for_each_surface(
-        ray,
-        [&](const SurfaceHit& hit) {
+        ray, hit,
+        [&] {
             product *= attenuation(medium, hit.t);
             return is_opaque(hit);
         },
-        [&](const SurfaceHit& hit) {
+        [&] {
             medium = medium_beyond(hit, ray.d, medium);
             return true;
         });
@@ -328,16 +328,19 @@ Ray Scene::segment(const RayEnd& a, const RayEnd& b) const {
     return {from, to - from, 1};
 }
 
+float Scene::transmittance(const Ray& ray) const {
+    // Most rays are blocked or meet no mask, and a query for any obstacle is cheaper than one for the nearest surface.
+    const Obstacle obstacle = owned_->accelerator.obstacle(ray);
+    if (obstacle == Obstacle::Passable) return masked_transmittance(ray);
+    return obstacle == Obstacle::None ? 1.0f : 0.0f;
+}
+
 float Scene::transmittance(const RayEnd& a, const RayEnd& b) const {
-    const Ray ray = segment(a, b);
-    if (!has_masks_) return owned_->accelerator.occluded(ray) ? 0.0f : 1.0f;
-    return masked_transmittance(ray);
+    return transmittance(segment(a, b));
 }
 
 float Scene::transmittance_to_infinity(const RayEnd& a, Vec3 d) const {
-    const Ray ray{offset_origin(a, d), d, kInf};
-    if (!has_masks_) return owned_->accelerator.occluded(ray) ? 0.0f : 1.0f;
-    return masked_transmittance(ray);
+    return transmittance({offset_origin(a, d), d, kInf});
 }
 
 Rgb Scene::attenuation(MediumId medium, const RayEnd& a, const RayEnd& b) const {
@@ -367,13 +370,14 @@ MediumId Scene::medium_around(const RayEnd& at) const {
             if (dot(d, at.ng) < 0) d = -d;
             MediumId medium = kVacuum;
             bool votes_here = true;
+            SurfaceHit hit;
             for_each_surface(
-                {offset_origin(at, d), d, kInf},
-                [&](const SurfaceHit& hit) {
+                {offset_origin(at, d), d, kInf}, hit,
+                [&] {
                     votes_here = through_opaque || hit.shape->is_interface || !is_opaque(hit);
                     return !votes_here;
                 },
-                [&](const SurfaceHit& hit) {
+                [&] {
                     if (!hit.shape->is_interface) return true;
                     medium = hit.shape->medium_toward(hit.geometry.ng, -d);
                     return false;

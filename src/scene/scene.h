@@ -3,6 +3,7 @@
 // path sampling.
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 #include <map>
 #include <memory>
@@ -115,10 +116,12 @@ public:
     bool intersect(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const;
     /// The same without media.
     bool intersect(const Ray& ray, float u, SurfaceHit& hit) const;
-    /// The two parts of intersect(): find() leaves out the geometry of most hits, and complete() adds it. In between,
+    /// The two parts of intersect(): find() leaves out the geometry of most hits, and complete() adds it; `u` is `number()`,
+    /// which is called where the ray meets the first masked surface. In between,
     /// several rays can ask for the memory that complete() reads: first prefetch_primitive(), then prefetch_vertices(),
     /// which reads what the former asked for; and after it for what the material reads.
-    bool find(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const;
+    bool find(const Ray& ray, const std::function<float()>& number, SurfaceHit& hit,
+              Passage& passage) const;
     /// Like find(), but the ray passes all surfaces that are not certain to stop it, and `passage.attenuation` has their
     /// factors 1 - opacity, too.
     bool find_certain(const Ray& ray, SurfaceHit& hit, Passage& passage) const;
@@ -230,13 +233,16 @@ private:
     template <class Stops>
     bool find_where(const Ray& ray, const Stops& stops, SurfaceHit& hit, Passage& passage) const;
     Ray segment(const RayEnd& a, const RayEnd& b) const;
+    float transmittance(const Ray& ray) const;
+    /// The same by a walk from surface to surface.
     float masked_transmittance(const Ray& ray) const;
     Rgb attenuation(MediumId medium, const Ray& ray) const;
-    /// For the surfaces along a ray in order: calls `stops(hit)` without the geometry, and unless that returns true,
-    /// `passes(hit)` with it, until that returns false or there are no more surfaces; returns the length of the rest of the
-    /// ray. `hit.t` is the distance from the previous surface.
+    /// For the surfaces along a ray in order: sets `hit`, calls `stops()` while it has no geometry, and unless that returns
+    /// true, `passes()` when it has, until that returns false or there are no more surfaces; returns the length of the rest of
+    /// the ray. `hit.t` is the distance from the previous surface.
     template <class Stops, class Passes>
-    float for_each_surface(Ray ray, const Stops& stops, const Passes& passes) const;
+    float for_each_surface(Ray ray, SurfaceHit& hit, const Stops& stops,
+                           const Passes& passes) const;
 
     std::string file_;
     std::shared_ptr<Owned> owned_;

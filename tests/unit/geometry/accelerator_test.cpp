@@ -43,7 +43,7 @@ TriangleMesh closed_mesh(int rows, int columns, float radius) {
 TEST(Accelerator, ClosedMeshesHaveNoGaps) {
     const TriangleMesh mesh = closed_mesh(60, 120, 1);
     Accelerator accelerator({.is_watertight = true});
-    accelerator.add_shape(mesh);
+    accelerator.add_shape({&mesh});
     accelerator.commit();
     testing::Random random(2);
     int missed = 0;
@@ -53,7 +53,7 @@ TEST(Accelerator, ClosedMeshesHaveNoGaps) {
         const Vec3 a = mesh.vertices()[t[0]].p, b = mesh.vertices()[t[1]].p;
         const Vec3 o = random.in_cube() * 0.3f;
         const Ray ray{o, normalize(a + (b - a) * random.between(0.01f, 0.99f) - o), kInf};
-        missed += !accelerator.intersect(ray, hit) || !accelerator.occluded(ray);
+        missed += !accelerator.intersect(ray, hit) || accelerator.obstacle(ray) != Obstacle::Opaque;
     }
     EXPECT_EQ(missed, 0);
 }
@@ -61,7 +61,7 @@ TEST(Accelerator, ClosedMeshesHaveNoGaps) {
 TEST(Accelerator, TakesHierarchiesOfGroupsFromAnEarlierOne) {
     const TriangleMesh mesh = closed_mesh(60, 120, 1), other = closed_mesh(20, 30, 1);
     const auto add = [&](Accelerator& a, float x) {
-        const uint32_t groups[] = {a.add_group({&mesh}), a.add_group({&other})};
+        const uint32_t groups[] = {a.add_group({{&mesh}}), a.add_group({{&other}})};
         a.add_instance(groups[0], Transform::translate({x, 0, 0}));
         a.add_instance(groups[1], Transform::translate({-x, 0, 0}));
         a.commit();
@@ -91,6 +91,22 @@ TEST(Accelerator, TakesHierarchiesOfGroupsFromAnEarlierOne) {
     EXPECT_GT(hits, 300);
     const Accelerator copy = moved;
     EXPECT_EQ(copy.memory_bytes(), moved.memory_bytes());
+}
+
+TEST(Accelerator, TakesHierarchiesOfGroupsOnlyWithTheSameObstacles) {
+    const TriangleMesh mesh = closed_mesh(6, 8, 1);
+    const auto obstacle = [&](Accelerator& a, bool may_let_rays_pass) {
+        a.add_instance(a.add_group({{&mesh, may_let_rays_pass}}), Transform::translate({2, 0, 0}));
+        a.commit();
+        return a.obstacle({{2, 0, 5}, {0, 0, -1}, kInf});
+    };
+    Accelerator opaque;
+    EXPECT_EQ(obstacle(opaque, false), Obstacle::Opaque);
+    Accelerator passable({}, opaque);
+    EXPECT_EQ(obstacle(passable, true), Obstacle::Passable);
+    Accelerator again({}, passable);
+    EXPECT_EQ(obstacle(again, false), Obstacle::Opaque);
+    EXPECT_EQ(again.obstacle({{2, 0, 5}, {0, 0, 1}, kInf}), Obstacle::None);
 }
 
 /// Images of different machines are the same to the bit only with the same instruction set, which checkpoints name.

@@ -100,10 +100,10 @@ TEST(AnalyticShapes, ParametersOfHits) {
         for (const bool in_group : {false, true}) {
             Accelerator accelerator;
             if (in_group)
-                accelerator.add_instance(accelerator.add_group({shape.get()}),
+                accelerator.add_instance(accelerator.add_group({{shape.get()}}),
                                          Transform::translate({0.5f, 0, 0}));
             else
-                accelerator.add_shape(*shape);
+                accelerator.add_shape({shape.get()});
             accelerator.commit();
             int hits = 0;
             for (int i = 0; i < 1000; ++i) {
@@ -113,7 +113,7 @@ TEST(AnalyticShapes, ParametersOfHits) {
                 RayHit hit;
                 if (!accelerator.intersect(ray, hit)) continue;
                 ++hits;
-                EXPECT_TRUE(accelerator.occluded(ray));
+                EXPECT_EQ(accelerator.obstacle(ray), Obstacle::Opaque);
                 Vec3 p = shape->surface(0, hit.u, hit.v, false).p;
                 if (in_group) p.x += 0.5f;
                 EXPECT_LT(length(p - (ray.o + ray.d * hit.t)), 2e-5f);
@@ -126,7 +126,7 @@ TEST(AnalyticShapes, ParametersOfHits) {
 void expect_hits_stay_in_place(const AnalyticShape& shape, Vec3 side) {
     testing::Random random(5);
     Accelerator accelerator;
-    accelerator.add_shape(shape);
+    accelerator.add_shape({&shape});
     accelerator.commit();
     int hits = 0;
     for (int i = 0; i < 1000; ++i) {
@@ -215,7 +215,7 @@ TEST(Accelerator, MemoryIsBounded) {
     const TriangleMesh mesh(std::move(arrays));
     const auto make = [&](size_t most) {
         Accelerator accelerator({.most_bytes = most});
-        accelerator.add_shape(mesh);
+        accelerator.add_shape({&mesh});
         accelerator.commit();
         return accelerator.memory_bytes();
     };

@@ -104,7 +104,7 @@ TEST(SurfaceJet, IsThatOfTheHit) {
     testing::Random random(2);
     for (const auto& [name, shape, is_curved] : shapes()) {
         Accelerator accelerator;
-        accelerator.add_shape(*shape);
+        accelerator.add_shape({shape.get()});
         accelerator.commit();
         int hits = 0;
         for (int i = 0; i < 500; ++i) {

@@ -270,5 +270,97 @@ TEST(Transmittance, OffsetsDoNotDependOnOtherObjects) {
     }
 }
 
+std::string masked(const std::string& opacity) {
+    return "<bsdf type=\"mask\">" + opacity + diffuse("0.6,0.5,0.4") + "</bsdf>";
+}
+
+std::string half_masked() {
+    return masked("<float name=\"opacity\" value=\"0.5\"/>");
+}
+
+/// The transmittance along a ray by a walk over all of its surfaces.
+float walked_transmittance(const Scene& scene, const Ray& ray) {
+    SurfaceHit hit;
+    Passage passage;
+    return scene.find_certain(ray, hit, passage) ? 0.0f : passage.attenuation.r;
+}
+
+TEST(Transmittance, OfMasksIsTheProductOverTheSurfaces) {
+    const std::string holes = masked(
+        "<texture name=\"opacity\" type=\"checkerboard\"><float name=\"color0\" "
+        "value=\"0\"/><float "
+        "name=\"color1\" value=\"1\"/><transform name=\"to_uv\"><scale value=\"5\"/></transform>"
+        "</texture>");
+    const Scene scene = build(
+        front_camera(1) + kSky +
+        rectangle("<rotate x=\"1\" angle=\"40\"/><translate z=\"0.5\"/>", holes) +
+        rectangle("<rotate y=\"1\" angle=\"70\"/><translate x=\"0.3\"/>", half_masked()) +
+        shape("disk", "<rotate x=\"1\" y=\"0.5\" angle=\"110\"/><translate y=\"-0.4\"/>",
+              half_masked()) +
+        shape("sphere", "<scale value=\"0.6\"/><translate x=\"-0.8\"/>", holes) +
+        shape("disk", "<scale value=\"0.7\"/><translate x=\"0.7\" z=\"-0.6\"/>") +
+        rectangle("<scale value=\"0.5\"/><rotate y=\"1\" angle=\"25\"/><translate y=\"0.9\"/>",
+                  diffuse("0.5,0.5,0.5")) +
+        instance(shape("disk", "<translate z=\"1\"/>", half_masked()) +
+                     rectangle("<scale value=\"0.3\"/>", holes) +
+                     shape("sphere", "<scale value=\"0.2\"/>"),
+                 "<scale value=\"0.7\"/><translate x=\"-0.2\" z=\"0.9\"/>"));
+    etendue::testing::Random random(13);
+    int blocked = 0, open = 0, masked = 0, blocked_behind_masks = 0;
+    for (int i = 0; i < 500'000; ++i) {
+        const Vec3 a = random.in_cube() * 2.0f, b = random.in_cube() * 2.0f;
+        for (const bool is_segment : {true, false}) {
+            const Ray ray{a, b - a, is_segment ? 1 : kInf};
+            const float Tr = is_segment ? scene.transmittance({a}, {b})
+                                        : scene.transmittance_to_infinity({a}, ray.d),
+                        walked = walked_transmittance(scene, ray);
+            (Tr == 0 ? blocked : Tr == 1 ? open : masked) += 1;
+            if (Tr == walked) continue;
+            // The walk goes on from points that are offset from masks, and may pass an edge of an opaque shape.
+            ASSERT_EQ(Tr, 0);
+            ++blocked_behind_masks;
+        }
+    }
+    EXPECT_GT(blocked, 100'000);
+    EXPECT_GT(open, 100'000);
+    EXPECT_GT(masked, 100'000);
+    EXPECT_LT(blocked_behind_masks, 20);
+}
+
+// Of two surfaces along a ray, the mask comes first or last.
+TEST(Transmittance, MasksDoNotHideWhatIsOpaque) {
+    for (const char* type : {"disk", "rectangle"})
+        for (const float z : {-1.0f, 1.0f}) {
+            const std::string veil = shape(type, "", half_masked()),
+                              wall = shape(type, fmt::format("<translate z=\"{}\"/>", z));
+            const RayEnd a{{0.1f, 0.2f, 5}}, b{{0.1f, 0.2f, -5}};
+            EXPECT_EQ(build(front_camera(1) + kSky + veil).transmittance(a, b), 0.5f) << type;
+            EXPECT_EQ(build(front_camera(1) + kSky + veil + wall).transmittance(a, b), 0) << type;
+        }
+}
+
+TEST(Transmittance, OfEditedMaterials) {
+    const auto described = [](float opacity) {
+        return parse_mitsuba_xml(
+            "<scene version=\"3.0.0\">" + front_camera(1) + kSky +
+                instance(
+                    shape("rectangle", "",
+                          masked(fmt::format("<float name=\"opacity\" value=\"{}\"/>", opacity))),
+                    "<translate x=\"3\"/>") +
+                shape("rectangle", "",
+                      masked(fmt::format("<float name=\"opacity\" value=\"{}\"/>", opacity))) +
+                "</scene>",
+            "test.xml");
+    };
+    BuildOptions options;
+    for (const float opacity : {1.0f, 0.25f, 0.5f, 1.0f}) {
+        BuiltScene built = build_scene_again(described(opacity), options);
+        for (const float x : {0.1f, 3.1f})
+            EXPECT_EQ(built.scene.transmittance({{x, 0.2f, 5}}, {{x, 0.2f, -5}}), 1 - opacity)
+                << "at " << x;
+        options.earlier = std::move(built.parts);
+    }
+}
+
 }  // namespace
 }  // namespace etendue::test
