@@ -111,17 +111,30 @@ RecordedRays::RecordedRays(const std::function<void()>& trace) {
 
 void RecordedRays::trace_range(size_t begin, size_t end) const {
     const auto scene = static_cast<RTCScene>(scene_);
-#if RTC_VERSION_MAJOR < 4
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
+    // The filter functions of masked shapes write behind the context.
+    struct {
+#if RTC_VERSION_MAJOR >= 4
+        RTCRayQueryContext context;
+#else
+        RTCIntersectContext context;
+#endif
+        bool meets_passable = false;
+    } query;
+#if RTC_VERSION_MAJOR >= 4
+    rtcInitRayQueryContext(&query.context);
+    RTCOccludedArguments arguments;
+    rtcInitOccludedArguments(&arguments);
+    arguments.context = &query.context;
+#else
+    rtcInitIntersectContext(&query.context);
 #endif
     for (size_t i = begin; i < end; ++i) {
         if (rays_[i].occlusion) {
             RTCRay ray = to_embree(rays_[i].ray);
 #if RTC_VERSION_MAJOR >= 4
-            __real_rtcOccluded1(scene, &ray, nullptr);
+            __real_rtcOccluded1(scene, &ray, &arguments);
 #else
-            __real_rtcOccluded1(scene, &context, &ray);
+            __real_rtcOccluded1(scene, &query.context, &ray);
 #endif
         } else {
             RTCRayHit hit;
@@ -131,7 +144,7 @@ void RecordedRays::trace_range(size_t begin, size_t end) const {
 #if RTC_VERSION_MAJOR >= 4
             __real_rtcIntersect1(scene, &hit, nullptr);
 #else
-            __real_rtcIntersect1(scene, &context, &hit);
+            __real_rtcIntersect1(scene, &query.context, &hit);
 #endif
         }
     }
