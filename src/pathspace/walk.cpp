@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 
 #include "guide/guide.h"
 
@@ -72,11 +73,13 @@ bool next_is_fixed_by_film(const Vertex& v, bool is_delta, const Scene& scene) {
 void trace(const WalkContext& walk, Sampler& sampler, SubPath& path, Step& step) {
     const Scene& scene = walk.scene;
     ++walk.stats.walk_rays;
-    // The number that decides at masks is the last one of its block. A chain in primary sample space keeps it for all rays.
-    std::optional<float> known;
-    if (scene.has_masks() && sampler.kind() == SamplerKind::PrimarySample)
-        known = sampler.next_1d();
-    const auto number = [&sampler, known] { return known ? *known : sampler.next_1d(); };
+    std::function<float()> number;
+    if (scene.has_masks()) {
+        // The last number of its block. A chain in primary sample space keeps it for all rays.
+        std::optional<float> known;
+        if (sampler.kind() == SamplerKind::PrimarySample) known = sampler.next_1d();
+        number = [&sampler, known] { return known ? *known : sampler.next_1d(); };
+    }
     Passage passage{step.medium};
     step.found = scene.find(step.ray, number, step.hit, passage);
     Flight& flight = path.flight;  // by member: a vector copy stalls on stores of members
