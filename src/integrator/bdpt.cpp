@@ -50,6 +50,7 @@ void add_bdpt_joins(const Bidirectional& paths, const SampleContext& c, const Te
         trace_light_path(paths, c, n, work, learned);
     }
     const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
+    const auto roulette = paths.roulette(c, work);
     for (int t = 2; t <= z.size(); ++t) {
         paths.add_hits(c, n, t, work);  // C(0,t)
         if (!paths.is_joinable(z, t)) continue;
@@ -58,7 +59,7 @@ void add_bdpt_joins(const Bidirectional& paths, const SampleContext& c, const Te
         if (!has_light_path) continue;
         const PhaseTimer of_connections(work.stats, &PhaseSeconds::connections);
         for (int s = 2; s <= y.size() && s + t - 1 <= paths.max_depth(); ++s)
-            paths.add(c, join_connect(c.scene, y, s, z, t, n), work);  // C(s,t)
+            paths.add_connection(c, n, y, s, t, roulette, work);  // C(s,t)
     }
 }
 

@@ -84,11 +84,7 @@ std::optional<Rgb> Bidirectional::test_with_survival(const SampleContext& c, con
                                                      uint64_t number, Workspace& work) {
     Rgb contribution = j.contribution;
     if (q < 1) {
-        c.sampler.seek(Stream::Roulette, number);
-        if (!(c.sampler.next_1d_unstructured() < double(q))) {
-            ++work.stats.joins_skipped;
-            return {};
-        }
+        if (!survives_roulette(q, number, c.sampler, work.stats)) return {};
         contribution *= 1 / q;
     }
     const float Tr = visibility(c.scene, j, work.stats);
@@ -105,6 +101,22 @@ std::optional<Rgb> Bidirectional::add_join(const SampleContext& c, const Join& j
     const auto value = test(c, j, scale * factor, number, work);
     if (value) c.sink.add(j, *value * factor);
     return value;
+}
+
+void Bidirectional::add_connection(const SampleContext& c, const TechniqueCounts& counts,
+                                   const SubPath& y, int s, int t, const Roulette& roulette,
+                                   Workspace& work, float factor, uint32_t draw) const {
+    if (s + t - 1 < shortest_) return;
+    const uint64_t number = join_number(s, t, draw);
+    const float scale = roulette.scale * factor;
+    const EarlyRoulette early{roulette.threshold, scale, number, c.sampler, work.stats};
+    const auto join = join_connect(c.scene, y, s, work.z, t, counts, &early);
+    if (!join) return;
+    // Whether the join is ended with its weight is decided by the same number.
+    const float q =
+        join_survival(luminance(join->contribution) * join->mis_weight * scale, roulette.threshold);
+    const auto value = test_with_survival(c, *join, q, number, work);
+    if (value) c.sink.add(*join, *value * factor);
 }
 
 }  // namespace etendue

@@ -110,6 +110,22 @@ public:
                           counts, work);
     }
 
+    /// Thresholds of join_survival() for contributions to the film point of the eye path work.z, which its joins with t ≥ 2
+    /// share.
+    struct Roulette {
+        float threshold;
+        float scale;  ///< What a unit of contribution adds to its pixel.
+    };
+    Roulette roulette(const SampleContext& c, const Workspace& work) const {
+        return {threshold(c, c.is_of_whole_film ? &work.z.film : nullptr),
+                std::fabs(work.z.film_weight)};
+    }
+    /// Makes C(s,t) of light vertices of `y`, t ≥ 2, and adds it as add() does. Unlike there, a join that roulette ends whatever
+    /// its weight is gets none.
+    void add_connection(const SampleContext& c, const TechniqueCounts& counts, const SubPath& y,
+                        int s, int t, const Roulette& roulette, Workspace& work, float factor = 1,
+                        uint32_t draw = 0) const;
+
     /// Adds the join, times `factor`, if it exists and passes test(), whose result is returned. If z_{t-1} has several
     /// joins of the same technique, `draw` distinguishes them.
     std::optional<Rgb> add(const SampleContext& c, const std::optional<Join>& join, Workspace& work,

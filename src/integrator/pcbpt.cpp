@@ -67,6 +67,7 @@ public:
         const TechniqueCounts n = counts(c.scene, c.light_paths);
         const SubPath& z = work.z;
         const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
+        const auto roulette = paths_.roulette(c, work);
         for (int t = 2; t <= z.size(); ++t) {
             paths_.add_hits(c, n, t, work);  // C(0,t)
             if (!paths_.is_joinable(z, t)) continue;
@@ -81,7 +82,7 @@ public:
             if (draws == 0) continue;
             const VertexMixture q = mixture(c.scene, n, t, work);
             for (int k = 0; k < draws; ++k)  // (1/K) Σ (1/M) w C(s,t) / pmf
-                connect(c, n, t, k, draws, q, work);
+                connect(c, n, t, k, draws, q, roulette, work);
         }
     }
 
@@ -221,7 +222,8 @@ private:
 
     /// Adds the k-th of `draws` connections of z_{t-1}.
     void connect(const SampleContext& c, const TechniqueCounts& n, int t, int k, int draws,
-                 const VertexMixture& mixture, Workspace& work) const {
+                 const VertexMixture& mixture, const Bidirectional::Roulette& roulette,
+                 Workspace& work) const {
         c.sampler.seek(Stream::Selection, join_number(0, t, uint32_t(k) + 1));
         const auto [index, pmf] =
             mixture.sample(stratum(k, draws, c.sampler.next_1d_unstructured()));
@@ -229,8 +231,8 @@ private:
         if (s + t - 1 > paths_.max_depth()) return;
         if (work.is_observed) compact_.restore(c.scene, path, work.y);
         const double samples = connections_ * double(kept(c.light_paths));
-        paths_.add(c, join_connect(c.scene, stored_[path], s, work.z, t, n), work,
-                   float(1 / (samples * pmf)), uint32_t(k) + 1);
+        paths_.add_connection(c, n, stored_[path], s, t, roulette, work, float(1 / (samples * pmf)),
+                              uint32_t(k) + 1);
     }
 
     /// Memory per vertex: in the cache, and restored for joins. What else the restored paths need is checked when they

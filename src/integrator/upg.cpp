@@ -115,6 +115,7 @@ public:
                                   .work = work};
         if (connects_) cache_.restore(c.scene, c.own_light_path(), work.y);
         const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
+        const auto roulette = paths_.roulette(c, work);
         for (int t = 2; t <= z.size(); ++t) {
             paths_.add_hits(c, n, t, work);  // C(0,t)
             if (!paths_.is_joinable(z, t)) continue;
@@ -123,7 +124,7 @@ public:
                 add_next_events(c, n, t, work);      // C(1,t)
                 const PhaseTimer of_connections(work.stats, &PhaseSeconds::connections);
                 for (int s = 2; s <= y.size() && s + t - 1 <= paths_.max_depth(); ++s)
-                    paths_.add(c, join_connect(c.scene, y, s, z, t, n), work);  // C(s,t)
+                    paths_.add_connection(c, n, y, s, t, roulette, work);  // C(s,t)
             }
             search.for_each_pair(
                 t, [&](const GatherPair& pair) { gather(c, n, search, pair, work); });  // U(s,t)

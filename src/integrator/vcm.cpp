@@ -90,6 +90,7 @@ public:
         const SubPath &y = work.y, &z = work.z;
         if (connects_) cache_.restore(c.scene, c.own_light_path(), work.y);
         const PhaseTimer timer(work.stats, &PhaseSeconds::eye_paths);
+        const auto roulette = paths_.roulette(c, work);
         for (int t = 2; t <= z.size(); ++t) {
             paths_.add_hits(c, n, t, work);  // C(0,t)
             if (!paths_.is_joinable(z, t)) continue;
@@ -97,7 +98,7 @@ public:
                 paths_.add(c, join_next_event(c.scene, z, t, c.sampler, n), work);  // C(1,t)
                 const PhaseTimer of_connections(work.stats, &PhaseSeconds::connections);
                 for (int s = 2; s <= y.size() && s + t - 1 <= paths_.max_depth(); ++s)
-                    paths_.add(c, join_connect(c.scene, y, s, z, t, n), work);  // C(s,t)
+                    paths_.add_connection(c, n, y, s, t, roulette, work);  // C(s,t)
             }
             if (is_exact_)
                 gather(c, n, t, work);  // U(s,t)

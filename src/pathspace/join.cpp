@@ -179,7 +179,8 @@ struct Edge {
 
 /// y_{s-1} (which may be y_0, as the emission sampled it) connected to z_{t-1}, t ≥ 2.
 std::optional<Edge> connect(const Scene& scene, const SubPath& y, int s, const SubPath& z, int t,
-                            const TechniqueCounts& counts) {
+                            const TechniqueCounts& counts,
+                            const EarlyRoulette* roulette = nullptr) {
     const Vertex& a = y[s - 1];
     const Vertex& b = z[t - 1];
     if (!a.is_connectible || !b.is_connectible) return {};
@@ -193,13 +194,14 @@ std::optional<Edge> connect(const Scene& scene, const SubPath& y, int s, const S
     if (fb.f.is_zero()) return {};
     const BsdfEval fa = a.eval(edge.w, TransportMode::Importance);
     if (fa.f.is_zero()) return {};
+    edge.contribution = a.beta * fa.f * fb.f * b.beta * inv_dist2;
+    if (scene.has_media()) edge.contribution *= edge_attenuation(scene, a, b, edge.w);
+    if (roulette && roulette->ends(edge.contribution)) return {};
+
     const double squares =
         s == 1 ? emission_squares(double(next_event_ratio(a, b, edge.w, counts.guide)),
                                   b.is_fixed_by_film, counts)
                : sqr(double(counts.connect * counts.reaching(b.is_fixed_by_film)));
-    edge.contribution = a.beta * fa.f * fb.f * b.beta * inv_dist2;
-    if (scene.has_media()) edge.contribution *= edge_attenuation(scene, a, b, edge.w);
-
     edge.rev_a = double(fb.pdf) * (a.has_cosine ? abs_dot(a.ng, edge.w) : 1.0f) * inv_dist2;
     edge.rev_b = double(fa.pdf) * abs_dot(b.ng, edge.w) * inv_dist2;
     if (a.is_infinite) edge.rev_a = fb.pdf;
@@ -231,8 +233,9 @@ Join joined(const Edge& edge, const Technique& technique, double np, const SubPa
 }  // namespace
 
 std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, const SubPath& z,
-                                 int t, const TechniqueCounts& counts) {
-    const auto edge = connect(scene, y, s, z, t, counts);
+                                 int t, const TechniqueCounts& counts,
+                                 const EarlyRoulette* roulette) {
+    const auto edge = connect(scene, y, s, z, t, counts, roulette);
     if (!edge) return {};
     const Technique technique{Strategy::Connect, s, t};
     const Vertex &a = y[s - 1], &b = z[t - 1];

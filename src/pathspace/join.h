@@ -28,6 +28,29 @@ struct Join {
 inline float join_survival(float contribution, float threshold) {
     return contribution < threshold ? contribution / threshold : 1.0f;
 }
+/// Whether the join with this number survives with probability q < 1; counts it otherwise.
+inline bool survives_roulette(float q, uint64_t number, Sampler& sampler, RenderStats& stats) {
+    sampler.seek(Stream::Roulette, number);
+    if (sampler.next_1d_unstructured() < double(q)) return true;
+    ++stats.joins_skipped;
+    return false;
+}
+
+/// Russian roulette of a join before its weight is known. No weight exceeds 1, so a join that ends with weight 1 would end with
+/// its own.
+struct EarlyRoulette {
+    float threshold;  ///< Of join_survival().
+    float scale;      ///< What a unit of contribution adds to its pixel.
+    uint64_t number;  ///< See join_number().
+    Sampler& sampler;
+    RenderStats& stats;
+
+    bool ends(const Rgb& C) const {
+        const float most = luminance(C) * scale;
+        return most < threshold &&
+               !survives_roulette(join_survival(most, threshold), number, sampler, stats);
+    }
+};
 
 /// Attenuation along the edge from `a`, which may be at infinity, to `b` by the medium that their surfaces define.
 Rgb edge_attenuation(const Scene& scene, const Vertex& a, const Vertex& b, Vec3 a_to_b);
@@ -45,7 +68,8 @@ std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t,
 void prefetch_next_events(const Scene& scene, std::span<const WalkInTurn> walks);
 /// C(s,t), t ≥ 2; for s = 1, y_0 comes from emission sampling (Strategy::Connect, not NextEvent).
 std::optional<Join> join_connect(const Scene& scene, const SubPath& y, int s, const SubPath& z,
-                                 int t, const TechniqueCounts& counts);
+                                 int t, const TechniqueCounts& counts,
+                                 const EarlyRoulette* roulette = nullptr);
 /// M(s,t): y_{s-1} and z_{t-1} treated as one vertex [Georgiev et al. 2012; Hachisuka et al. 2012]. For one light path.
 std::optional<Join> join_merge(const SubPath& y, int s, const SubPath& z, int t,
                                const TechniqueCounts& counts);
