@@ -157,7 +157,10 @@ std::optional<Join> join_specular(const Scene& scene, const SubPath& z, int t,
                 q_guess = std::fmax(kLeast, join_survival(kMargin * guess, limits.threshold));
     if (!(u_before < q_guess)) return {};
     const auto w = tracer.solve(seed->w, seed->events, seed->ray, lamp.target());
-    if (!w) return {};
+    if (!w) {
+        ++work.stats.chain_failures;
+        return {};
+    }
     auto found = evaluate(from, lamp, *w, seed->events, tracer);
     if (!found) return {};
     const RayEnd first = tracer.first();
@@ -169,6 +172,7 @@ std::optional<Join> join_specular(const Scene& scene, const SubPath& z, int t,
     ++work.stats.chains;
     const uint64_t trials =
         count_trials(*found, lamp, seeds, tracer, limits.most_trials, sampler, work);
+    RenderStats::count_trials(trials, work.stats.chains_by_trials);
     if (work.is_observed) record(lamp, *found, tracer, work.pair);
     return Join{.technique = {Strategy::Specular, found->events.count + 1, t},
                 .emitter = lamp.emitter,

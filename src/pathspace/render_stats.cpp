@@ -15,10 +15,14 @@ RenderStats& RenderStats::operator+=(const RenderStats& o) {
     visible_pairs += o.visible_pairs;
     trials += o.trials;
     trial_rays += o.trial_rays;
-    for (size_t i = 0; i < pairs_by_trials.size(); ++i) pairs_by_trials[i] += o.pairs_by_trials[i];
+    for (size_t i = 0; i < pairs_by_trials.size(); ++i) {
+        pairs_by_trials[i] += o.pairs_by_trials[i];
+        chains_by_trials[i] += o.chains_by_trials[i];
+    }
     chains += o.chains;
     chain_seeds += o.chain_seeds;
     chain_trials += o.chain_trials;
+    chain_failures += o.chain_failures;
     chain_rays += o.chain_rays;
     bounds_exceeded += o.bounds_exceeded;
     runaways += o.runaways;

@@ -39,19 +39,21 @@ struct RenderStats {
     uint64_t pairs = 0;                   ///< Merged, or found by searches for gathers.
     uint64_t visible_pairs = 0;           ///< Gathered pairs whose shadow ray was not blocked.
     uint64_t trials = 0, trial_rays = 0;  ///< Of all visible pairs.
-    /// Visible pairs by trials: 1, 2, 3–4, 5–8, … The share of those with 1 is 1 - Var(r)/E(r)².
-    std::array<uint64_t, 24> pairs_by_trials{};
+    /// By trials: 1, 2, 3–4, 5–8, …
+    using ByTrials = std::array<uint64_t, 24>;
+    ByTrials pairs_by_trials{};  ///< Visible pairs. The share of those with 1 is 1 - Var(r)/E(r)².
+    ByTrials chains_by_trials{};
     uint64_t chains = 0;           ///< Found by specular connections, and evaluated.
     uint64_t chain_seeds = 0;      ///< From which Newton's method started, or could not start.
     uint64_t chain_trials = 0;     ///< Those of them that were trials.
+    uint64_t chain_failures = 0;   ///< Searches in which Newton's method found no chain.
     uint64_t chain_rays = 0;       ///< Of seeds and of Newton's method.
     uint64_t bounds_exceeded = 0;  ///< Densities above their assumed bound; must be 0.
     uint64_t runaways = 0;         ///< Pairs abandoned after too many trials; must be 0.
     uint64_t rejected = 0;         ///< Contributions that were not finite or negative.
 
-    void count_trials(uint64_t n) {
-        ++pairs_by_trials[std::min<size_t>(size_t(std::bit_width(n - 1)),
-                                           pairs_by_trials.size() - 1)];
+    static void count_trials(uint64_t n, ByTrials& of) {
+        ++of[std::min<size_t>(size_t(std::bit_width(n - 1)), of.size() - 1)];
     }
     RenderStats& operator+=(const RenderStats& o);
     /// All numbers; a new one does not compile until it is here.
@@ -59,12 +61,13 @@ struct RenderStats {
     static void for_each_field(Stats& stats, const Use& use) {
         auto& [phases, time_factor, eye_paths, light_paths, vertices, walk_rays, shadow_rays,
                visible, joins_skipped, pairs, visible_pairs, trials, trial_rays, pairs_by_trials,
-               chains, chain_seeds, chain_trials, chain_rays, bounds_exceeded, runaways, rejected] =
-            stats;
+               chains_by_trials, chains, chain_seeds, chain_trials, chain_failures, chain_rays,
+               bounds_exceeded, runaways, rejected] = stats;
         (void)time_factor;  // Of the current sample.
         use(phases), use(eye_paths), use(light_paths), use(vertices), use(walk_rays);
         use(shadow_rays), use(visible), use(joins_skipped), use(pairs), use(visible_pairs);
         use(trials), use(chains), use(chain_seeds), use(chain_trials), use(chain_rays);
+        use(chain_failures), use(chains_by_trials);
         use(trial_rays), use(pairs_by_trials), use(bounds_exceeded), use(runaways), use(rejected);
     }
     uint64_t rays() const { return walk_rays + shadow_rays + trial_rays + chain_rays; }

@@ -32,6 +32,8 @@ nlohmann::json statistics(const Film& film, const RenderStats& s, double seconds
         {"chains", s.chains},
         {"chain_seeds", s.chain_seeds},
         {"chain_trials", s.chain_trials},
+        {"chain_failures", s.chain_failures},
+        {"chains_by_trials", s.chains_by_trials},
         {"chain_rays", s.chain_rays},
         {"bounds_exceeded", s.bounds_exceeded},
         {"runaways", s.runaways},

@@ -127,7 +127,7 @@ double reciprocal_probability(const Scene& scene, const PairEvent& event, Sample
         scratch.set_surface(*hit.shape, hit.location, hit.geometry, -ray->d, arena);
         if (!scratch.is_connectible || !event.near.contains(scratch.p, arrival_side(scratch)))
             continue;
-        stats.count_trials(n);
+        RenderStats::count_trials(n, stats.pairs_by_trials);
         return double(n) / (double(event.from.survival.value()) * trials.mass());
     }
     ++stats.runaways;

@@ -14,6 +14,8 @@ namespace etendue::test {
 namespace {
 
 constexpr int kAgreementSize = 16;
+/// Without specular connections, which some methods below have.
+const std::string kPath = "path:specular_connections=off";
 
 struct AgreementCase {
     const char* name;
@@ -160,7 +162,7 @@ protected:
         const AgreementCase& c = GetParam();
         const Scene scene = build(c.xml);
         const double resolution = c.resolution / std::sqrt(double(factor));
-        const Tiles path = indirect_tiles(scene, "path", path_factor * factor * c.passes, 1);
+        const Tiles path = indirect_tiles(scene, kPath, path_factor * factor * c.passes, 1);
         expect_same_image(indirect_tiles(scene, "bdpt", factor * c.passes, 2), path, resolution,
                           "bdpt against path");
         expect_same_image(indirect_tiles(scene, "upg+bdpt:radius=0.12", factor * c.passes, 4), path,
@@ -181,7 +183,7 @@ class ChainAgreement : public Agreement {};
 TEST_P(ChainAgreement, WithPathTracing) {
     const AgreementCase& c = GetParam();
     const Scene scene = build(c.xml);
-    const Tiles path = indirect_tiles(scene, "path", 2 * c.passes, 1);
+    const Tiles path = indirect_tiles(scene, kPath, 2 * c.passes, 1);
     // The variance of mlt's passes has long tails.
     for (const auto& [method, more] :
          {std::pair("pssmlt:chains=16,groups=", uint64_t{1}),
@@ -200,7 +202,7 @@ class GuidedChainAgreement : public Agreement {};
 TEST_P(GuidedChainAgreement, WithPathTracing) {
     const AgreementCase& c = GetParam();
     const Scene scene = build(c.xml);
-    const Tiles path = indirect_tiles(scene, "path", 2 * c.passes, 1);
+    const Tiles path = indirect_tiles(scene, kPath, 2 * c.passes, 1);
     for (const char* guide : {"guide=on,guide_walks=4000", "guide=random"})
         for (const char* method : {"pssmlt:chains=16", "mmlt:chains=48", "mlt:chains=48"}) {
             const uint64_t passes = std::min<uint64_t>(512, c.passes);
@@ -218,7 +220,7 @@ protected:
         const AgreementCase& c = GetParam();
         const Scene scene = build(c.xml);
         const double resolution = c.resolution / std::sqrt(double(factor));
-        const Tiles path = render_tiles(scene, "path", {2 * factor * c.passes, 4, 1});
+        const Tiles path = render_tiles(scene, kPath, {2 * factor * c.passes, 4, 1});
         for (const std::string guide :
              {"guide=on", "guide=hp02", "guide=random", "guide=on,guide_roulette=false",
               "guide=random,guide_roulette=false"}) {
@@ -245,7 +247,7 @@ class LongGuidedAgreement : public GuidedAgreement {};
 /// All parameters of gathers give unbiased methods.
 TEST(GatherChoices, AgreeWithPathTracing) {
     const Scene scene = build(mixed_room(front_camera(kAgreementSize)));
-    const Tiles path = indirect_tiles(scene, "path", 400, 1);
+    const Tiles path = indirect_tiles(scene, kPath, 400, 1);
     uint64_t seed = 5;
     for (const char* choice : {"bound=box", "bound=cone", "drop=eye", "drop=light", "drop=both"})
         expect_same_image(
@@ -259,7 +261,8 @@ class SpecularAgreement : public ::testing::TestWithParam<AgreementCase> {};
 TEST_P(SpecularAgreement, WithPathTracing) {
     const AgreementCase& c = GetParam();
     const Scene scene = build(c.xml);
-    const Tiles path = render_tiles(scene, "path:rr_depth=20,max_depth=8", {8 * c.passes, 4, 1});
+    const Tiles path =
+        render_tiles(scene, kPath + ",rr_depth=20,max_depth=8", {8 * c.passes, 4, 1});
     for (const std::string method : {"path", "bdpt", "pcbpt", "upg+bdpt"})
         expect_same_image(render_tiles(scene,
                                        method + ":rr_depth=20,max_depth=8,specular_connections=on",

@@ -500,22 +500,36 @@ std::string point_light(const std::string& position) {
            "\"/><rgb name=\"intensity\" value=\"3,2,1\"/></emitter>";
 }
 
-/// The irradiance that a point light of unit intensity at height `above` makes at a distance `aside` below a glass pane of
-/// this width.
-double irradiance_below_pane(double aside, double above, double width, double& cos) {
+/// The irradiance of a floor at a distance `aside` from an axis, by a point light of unit intensity on the axis whose light
+/// arrives at the distance reach(θ), which grows with the angle θ between its direction and the axis. `theta` becomes the angle.
+template <class Reach>
+double irradiance(const Reach& reach, double aside, double& theta) {
+    double low = 0, high = 1.5;
+    for (int i = 0; i < 100; ++i) (reach((low + high) / 2) < aside ? low : high) = (low + high) / 2;
+    theta = std::max(low, 1e-6);
+    const double step = 1e-7, slope = (reach(theta + step) - reach(theta - step)) / (2 * step);
+    return std::sin(theta) / (reach(theta) * slope);  // dω/dA
+}
+
+/// Below horizontal glass panes that have this width together. The light is at height `above`.
+double irradiance_below_panes(double aside, double above, double width, double& cos) {
     const auto theta_in_glass = [](double theta) {
         return std::asin(std::sin(theta) / double(kGlassEta));
     };
     const auto reach = [&](double theta) {
         return (above - width) * std::tan(theta) + width * std::tan(theta_in_glass(theta));
     };
-    double low = 0, high = 1.5;
-    for (int i = 0; i < 100; ++i) (reach((low + high) / 2) < aside ? low : high) = (low + high) / 2;
-    const double theta = std::max(low, 1e-6), step = 1e-7,
-                 slope = (reach(theta + step) - reach(theta - step)) / (2 * step);
+    double theta;
+    const double E = irradiance(reach, aside, theta);
     cos = std::cos(theta);
-    // dω/dA on the floor
-    return std::sin(theta) / (reach(theta) * slope);
+    return E;
+}
+
+std::string pane(float half_width, float height) {
+    return fmt::format("<shape type=\"cube\"><transform name=\"to_world\"><scale x=\"9\" "
+                       "y=\"9\" z=\"{}\"/><translate z=\"{}\"/></transform>"
+                       "<bsdf type=\"dielectric\">{}</shape>",
+                       half_width, height, kPlainGlass);
 }
 
 TEST(SpecularConnections, PointLightBehindAPane) {
@@ -525,23 +539,69 @@ TEST(SpecularConnections, PointLightBehindAPane) {
                   "<bsdf type=\"mask\"><float name=\"opacity\" value=\"0.5\"/>" + lambert(Rgb(0)) +
                       "</bsdf>");
     for (const auto& [below, share] : {std::pair(std::string(), 1.0f), {mask, 0.5f}}) {
-        const Scene scene =
-            build(camera_above("perspective", 1) + floor_of(kFloor) +
-                  "<shape type=\"cube\"><transform name=\"to_world\"><scale x=\"9\" y=\"9\" "
-                  "z=\"0.25\"/><translate z=\"3\"/></transform><bsdf type=\"dielectric\">" +
-                  kPlainGlass + "</shape>" + below + point_light("0.3,-0.2,4"));
+        const Scene scene = build(camera_above("perspective", 1) + floor_of(kFloor) +
+                                  pane(0.25f, 3) + below + point_light("0.3,-0.2,4"));
         expect_image(
             scene, {"path:max_depth=4" + kSpecular}, 8192,
             [&, share = share](float x, float y) {
                 const Vec3 p = on_plane(1, x, y);
                 double cos;
                 const double E =
-                    irradiance_below_pane(std::hypot(p.x - 0.3, p.y + 0.2), 4, 0.5, cos);
+                    irradiance_below_panes(std::hypot(p.x - 0.3, p.y + 0.2), 4, 0.5, cos);
                 const float T = 1 - fresnel_dielectric(float(cos), kGlassEta).R;
                 return kFloor * Rgb(3, 2, 1) * (share * float(E) * sqr(T) * kInvPi);
             },
             0.03);
     }
+}
+
+/// Light that passes both panes does so with four events.
+TEST(SpecularConnections, PointLightBehindTwoPanes) {
+    const Scene scene = build(camera_above("perspective", 1) + floor_of(kFloor) +
+                              pane(0.15f, 2.6f) + pane(0.25f, 3.3f) + point_light("0.3,-0.2,4"));
+    expect_image(
+        scene, {"path:max_depth=6" + kSpecular}, 8192,
+        [&](float x, float y) {
+            const Vec3 p = on_plane(1, x, y);
+            double cos;
+            const double E = irradiance_below_panes(std::hypot(p.x - 0.3, p.y + 0.2), 4, 0.8, cos);
+            const float T = 1 - fresnel_dielectric(float(cos), kGlassEta).R;
+            return kFloor * Rgb(3, 2, 1) * (float(E) * sqr(sqr(T)) * kInvPi);
+        },
+        0.03);
+}
+
+/// A ball above the light spreads what it reflects. The light itself arrives, too.
+TEST(SpecularConnections, PointLightBelowAMirrorBall) {
+    constexpr double kLight = 2, kCenter = 3, kRadius = 0.5;  // heights on the axis
+    const Scene scene =
+        build(camera_above("perspective", 1) + floor_of(kFloor, 1.5f) +
+              "<shape type=\"sphere\"><point name=\"center\" value=\"0.3,-0.2,3\"/>"
+              "<float name=\"radius\" value=\"0.5\"/><bsdf type=\"conductor\"><string "
+              "name=\"material\" value=\"none\"/></bsdf></shape>" +
+              point_light("0.3,-0.2,2"));
+    const auto reach = [](double theta) {
+        const double d = kCenter - kLight, along = d * std::cos(theta),
+                     root = sqr(along) - sqr(d) + sqr(kRadius);
+        if (root < 0) return 1e9;
+        const double t = along - std::sqrt(root);  // to the ball
+        const double x = t * std::sin(theta), z = t * std::cos(theta) - d;
+        // Reflected about the normal (x, z) / r.
+        const double projected = 2 * (std::sin(theta) * x + std::cos(theta) * z) / sqr(kRadius),
+                     wx = std::sin(theta) - projected * x, wz = std::cos(theta) - projected * z;
+        return wz < 0 ? x + wx * (kCenter + z) / -wz : 1e9;
+    };
+    expect_image(
+        scene, {"path:max_depth=3" + kSpecular}, 4096,
+        [&](float x, float y) {
+            const Vec3 p = on_plane(1, x, y);
+            const double aside = std::hypot(p.x - 0.3, p.y + 0.2);
+            double theta;
+            const double reflected = irradiance(reach, aside, theta),
+                         direct = kLight / std::pow(sqr(aside) + sqr(kLight), 1.5);
+            return kFloor * Rgb(3, 2, 1) * (float(reflected + direct) * kInvPi);
+        },
+        0.03);
 }
 
 /// The image of the light in a mirror, and the light itself.

@@ -3,6 +3,7 @@
 #include "manifold/specular_connection.h"
 
 #include <array>
+#include <numeric>
 
 #include <gtest/gtest.h>
 
@@ -205,6 +206,10 @@ TEST(SpecularTrials, DoNotDependOnRoulette) {
     }
     EXPECT_GT(compared, 20);
     EXPECT_GT(ended, 20) << "nothing was subject to roulette";
+    const auto& by_trials = work.stats.chains_by_trials;
+    EXPECT_EQ(std::accumulate(by_trials.begin(), by_trials.end(), uint64_t(0)), work.stats.chains);
+    EXPECT_LE(work.stats.chains + work.stats.chain_failures,
+              work.stats.chain_seeds - work.stats.chain_trials);
 }
 
 /// Light of a point that no specular connection can make is all left to hits of the lens.
