@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "choice_info.h"
 #include "commands.h"
 #include "guide_info.h"
 #include "image/denoiser.h"
@@ -14,6 +15,7 @@
 #include "render/render_request.h"
 #include "render/scene_integrator.h"
 #include "scene_options.h"
+#include "usage_error.h"
 
 namespace etendue {
 namespace {
@@ -109,14 +111,31 @@ void image_info(const std::string& file, bool as_json) {
         std::visit([&](const auto& v) { fmt::print("  {}  {}\n", a.first, v); }, a.second);
 }
 
-void info(const SceneOptions& options, const GuideInfo& guide, bool as_json) {
-    if (SectionReader::is_one(options.file)) return checkpoint_info(options.file, as_json);
-    if (is_image(options.file)) return image_info(options.file, as_json);
+/// Of `info`.
+struct InfoOptions {
+    SceneOptions scene;
+    GuideInfo guide;
+    ChoiceInfo choice;
+    /// Of --guide and --choice.
+    std::string integrator;
+    uint64_t seed = 0;
+    int threads = 0;
+    bool json = false;
+};
+
+void info(const InfoOptions& o) {
+    const bool as_json = o.json;
+    const GuideInfo& guide = o.guide;
+    if (SectionReader::is_one(o.scene.file)) return checkpoint_info(o.scene.file, as_json);
+    if (is_image(o.scene.file)) return image_info(o.scene.file, as_json);
     guide.check();
-    SceneOptions loading = options;
-    loading.threads = guide.threads;
+    SceneOptions loading = o.scene;
+    loading.threads = o.threads;
     const Scene s = load_scene(loading);
-    const nlohmann::json learned = guide.is_wanted ? guide.run(s) : nlohmann::json();
+    const nlohmann::json learned =
+        guide.is_wanted ? guide.run(s, o.integrator, o.seed, o.threads) : nlohmann::json();
+    const nlohmann::json choice =
+        o.choice.is_wanted ? o.choice.run(s, o.integrator, o.seed, o.threads) : nlohmann::json();
     const Scene::Statistics& st = s.statistics();
     const Bounds3& b = s.bounds();
     double power = 0;
@@ -145,6 +164,7 @@ void info(const SceneOptions& options, const GuideInfo& guide, bool as_json) {
                          {"spp", default_spp(s)},
                          {"warnings", warnings_of(s)}};
         if (guide.is_wanted) j["guide"] = learned;
+        if (o.choice.is_wanted) j["choice"] = choice;
         fmt::print("{}", json_text(j));
         return;
     }
@@ -172,23 +192,36 @@ void info(const SceneOptions& options, const GuideInfo& guide, bool as_json) {
                mebibytes(st.geometry_bytes), mebibytes(st.accelerator_bytes),
                mebibytes(st.texture_bytes));
     if (guide.is_wanted) fmt::print("{}", guide_text(learned));
+    if (o.choice.is_wanted) fmt::print("{}", choice_text(choice));
     for (const std::string& w : warnings_of(s)) fmt::print("  warning     {}\n", w);
 }
 
 }  // namespace
 
 void add_info_command(CLI::App& app) {
-    struct Options {
-        SceneOptions scene;
-        GuideInfo guide;
-        bool json = false;
-    };
-    auto options = std::make_shared<Options>();
+    auto options = std::make_shared<InfoOptions>();
     CLI::App& c = *app.add_subcommand("info", "Summarise a scene, a checkpoint or an image");
     options->scene.add_to(c);
     options->guide.add_to(c);
+    options->choice.add_to(c);
+    c.get_option("--choice")->excludes(c.get_option("--guide"));
+    std::vector<CLI::Option*> of_both{
+        c.add_option("-i,--integrator", options->integrator,
+                     "Method with parameters: of --guide the one whose guide is trained (default: "
+                     "the scene's), of --choice auto with parameters"),
+        c.add_option("--seed", options->seed, "Seed of the training, or of the choice")
+            ->capture_default_str(),
+        c.add_option("--threads", options->threads, "Number of threads; 0: one per core")
+            ->capture_default_str()
+            ->check(CLI::Range(0, 4096))};
     c.add_flag("--json", options->json, "Print JSON");
-    c.callback([options] { info(options->scene, options->guide, options->json); });
+    c.callback([options, of_both] {
+        for (const CLI::Option* option : of_both)
+            if (option->count() > 0 && !options->guide.is_wanted && !options->choice.is_wanted)
+                throw UsageError(
+                    fmt::format("{} requires --guide or --choice", option->get_name()));
+        info(*options);
+    });
 }
 
 }  // namespace etendue

@@ -120,10 +120,6 @@ void GuideInfo::add_to(CLI::App& command) {
     CLI::Option* guide = command.add_flag(
         "--guide", is_wanted, "Train the guide of the method and summarise what it has learned");
     command
-        .add_option("-i,--integrator", integrator,
-                    "Method with parameters whose guide is trained (default: the scene's)")
-        ->needs(guide);
-    command
         .add_option("--shares", shares,
                     "Image to write: share of guided directions at the first surfaces, red for eye "
                     "walks, green for light walks")
@@ -139,11 +135,6 @@ void GuideInfo::add_to(CLI::App& command) {
                     "Image to write: learned directions at the pixel, red for eye walks, green for "
                     "light walks, blue for emission")
         ->needs(at);
-    command.add_option("--seed", seed, "Seed of the training")->capture_default_str()->needs(guide);
-    command.add_option("--threads", threads, "Number of threads; 0: one per core")
-        ->capture_default_str()
-        ->check(CLI::Range(0, 4096))
-        ->needs(guide);
 }
 
 void GuideInfo::check() const {
@@ -154,7 +145,8 @@ void GuideInfo::check() const {
         }
 }
 
-json GuideInfo::run(const Scene& scene) const {
+json GuideInfo::run(const Scene& scene, const std::string& integrator, uint64_t seed,
+                    int threads) const {
     const LearnedGuide learned(scene, choose_integrator(scene, integrator), seed, threads);
     const Guide& guide = learned.guide();
     json place;

@@ -17,16 +17,15 @@ namespace etendue {
 
 struct GuideInfo {
     bool is_wanted = false;
-    std::string integrator, shares, directions;
+    std::string shares, directions;
     std::vector<int> pixel;  ///< Empty, or column and row.
-    uint64_t seed = 0;
-    int threads = 0;
 
     void add_to(CLI::App& command);
     /// Throws where an option is wrong, before a scene is read.
     void check() const;
-    /// Trains, writes the images, and returns the rest as JSON.
-    nlohmann::json run(const Scene& scene) const;
+    /// Trains the guide of a method, of the scene's if `integrator` is empty; writes the images, and returns the rest as JSON.
+    nlohmann::json run(const Scene& scene, const std::string& integrator, uint64_t seed,
+                       int threads) const;
 };
 
 /// The result of GuideInfo::run() as text.

@@ -7,6 +7,10 @@
 
 namespace etendue {
 
+int threads_of_auto(const IntegratorParams& params) {
+    return params.integer("threads", 1, 4096);
+}
+
 const IntegratorEntry& auto_entry() {
     static const IntegratorEntry entry{
         {"integrator",
@@ -19,10 +23,14 @@ const IntegratorEntry& auto_entry() {
            "processes render together."},
           {"consistent", ParamKind::Bool, "false",
            "Whether vcm is a candidate, which is biased, but consistent."},
+          {"threads", ParamKind::Int, "1",
+           "Number of threads by which --time is multiplied, in [1, 4096]: with it, the choice is "
+           "that for a rendering on so many threads, on any machine."},
           {"user_paths", ParamKind::String, "",
            "JSON file of important light sub-paths for mlt, as in mlt."}}},
         [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
             p.flag("chains"), p.flag("consistent"), p.integer("max_depth");
+            threads_of_auto(p);
             return make_integrator({"bdpt", {{"max_depth", p.string("max_depth")}}});
         }};
     return entry;

@@ -8,6 +8,9 @@ namespace etendue {
 /// choose for, it is `bdpt`.
 const IntegratorEntry& auto_entry();
 
+/// The parameter `threads`.
+int threads_of_auto(const IntegratorParams& params);
+
 inline bool is_auto(const IntegratorSpec& spec) {
     return !spec.make && spec.name == auto_entry().info.name;
 }

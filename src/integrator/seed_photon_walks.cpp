@@ -12,9 +12,8 @@ SeedPhotons trace_seed_photons(const PassContext& pass, int depth, uint64_t walk
     const TechniqueCounts unguided{.connect = 1, .specular_depth = depth};
     pass.for_each_other_path(blocks.size(), [&](uint64_t b, Sampler&, Workspace& work) {
         Sampler sampler(SamplerKind::Independent, seed);
-        RenderStats stats;  // not of the image
         const int longest = depth + 2;
-        const WalkContext walk{pass.scene, unguided, stats, {longest, longest}};
+        const WalkContext walk{pass.scene, unguided, work.stats, {longest, longest}};
         SubPath& y = work.y;
         for (uint64_t i = b * kBlock; i < (b + 1) * kBlock; ++i) {
             sampler.start(0, i);

@@ -102,7 +102,7 @@ SpecularPilot run_specular_pilot(const PassContext& pass, const DepthOptions& de
     pass.for_each_other_path(blocks.size(), [&](uint64_t b, Sampler&, Workspace& work) {
         Sampler sampler(SamplerKind::Independent, seed);
         Block& block = blocks[b];
-        const RenderStats of_image = work.stats;
+        const RenderStats before = work.stats;
         work.stats = {};
         const WalkContext walk{pass.scene, counts, work.stats, depth.walk()};
         for (uint64_t i = b * kBlock; i < (b + 1) * kBlock; ++i) {
@@ -118,7 +118,7 @@ SpecularPilot run_specular_pilot(const PassContext& pass, const DepthOptions& de
         }
         block.rays_without += double(work.stats.walk_rays + work.stats.shadow_rays);
         block.chain_rays += double(work.stats.chain_rays);
-        work.stats = of_image;  // The pilot is not a part of it.
+        work.stats += before;
     });
     Block sum;
     for (const Block& b : blocks) {

@@ -49,8 +49,12 @@ double typical_sample_seconds(const std::string& method) {
     return cost_of(method).sample_seconds;
 }
 
-double specular_pilot_seconds() {
+double typical_specular_pilot_seconds() {
     return 0.03;
+}
+
+double specular_photon_seconds() {
+    return 0.1;
 }
 
 double training_seconds(uint64_t walks) {

@@ -15,8 +15,10 @@ double simulated_seconds(const std::string& method, bool is_guided, const Render
 double guided_factor(bool is_guided);
 /// The same for a sample of a method of which nothing is known yet.
 double typical_sample_seconds(const std::string& method);
-/// The same for what a method decides about specular connections, see Specular::prepare().
-double specular_pilot_seconds();
+/// The same for the first decision about specular connections, see run_specular_pilot().
+double typical_specular_pilot_seconds();
+/// Seconds for the photons of a rendering with specular connections.
+double specular_photon_seconds();
 /// The same for a guide that is trained by so many walks of each kind.
 double training_seconds(uint64_t walks);
 

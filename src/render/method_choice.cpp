@@ -25,8 +25,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// The largest part of a rendering that pilots may take, by simulated time.
-constexpr double kShare = 0.08;
+/// The largest part of a rendering that pilots may take, by simulated time. They are planned to take a little less, since
+/// what they take is not known before.
+constexpr double kShare = 0.08, kPlannedShare = 0.075;
 /// Pixels of the first film of pilots, and of the largest one. From one to the next, there are kGrowth times as many, so
 /// that the last pilots take most of the time.
 constexpr double kFirstPixels = 768, kMostPixels = 49152, kGrowth = 4;
@@ -37,6 +38,8 @@ constexpr double kHopeless = 3;
 constexpr double kLongChains = 1.5;
 /// Simulated seconds that a rendering without limits is taken to have.
 constexpr double kUnlimitedSeconds = 60;
+/// relMSE of an image with one sample per pixel, before there are pilots: of simple scenes.
+constexpr double kPlausibleError = 1;
 /// Walks of each kind that train the guide of a pilot.
 constexpr uint64_t kWalksOfPilot = 16384;
 /// The same of the rendering, whose methods have their default parameters.
@@ -67,8 +70,9 @@ struct Contender {
     /// Of the last pilot; 0: there was none.
     struct History {
         double image_noise = 0;
-        double start_a_pixel = 0;  ///< Simulated seconds of what was made once.
+        double start_a_pixel = 0;  ///< Simulated seconds of MethodPilot::start_seconds.
     } history;
+    double prepared_seconds = 0;  ///< Simulated, of what its first pilot has prepared.
 
     static Contender of(const std::string& method, const std::string& params = "") {
         return {
@@ -117,15 +121,18 @@ std::vector<Contender> contenders(const Scene& scene, const IntegratorParams& as
 /// Simulated seconds: of the rendering, and of the pilots, which may take a small part of it.
 class Budget {
 public:
-    Budget(const RenderLimits& limits, double pixels, double sample_seconds)
-        : limits_(limits), pixels_(pixels), sample_seconds_(sample_seconds) {}
+    Budget(const RenderLimits& limits, int threads, double pixels, double sample_seconds)
+        : limits_(limits), pixels_(pixels), sample_seconds_(sample_seconds) {
+        if (limits_.seconds) *limits_.seconds *= threads;
+    }
 
     /// Of the rendering: what the first limit takes that is reached.
     double seconds() const {
         double seconds = std::numeric_limits<double>::infinity();
         if (limits_.spp) seconds = double(*limits_.spp) * pixels_ * sample_seconds_;
         if (limits_.seconds) seconds = std::min(seconds, *limits_.seconds);
-        if (limits_.error) seconds = std::min(seconds, error_seconds_);
+        if (limits_.error)
+            seconds = std::min(seconds, error_seconds_.value_or(plausible_error_seconds()));
         return std::isfinite(seconds) ? seconds : kUnlimitedSeconds;
     }
     std::optional<double> error() const { return limits_.error; }
@@ -134,16 +141,24 @@ public:
     /// The time in which the best method reaches error(): no more than that can be saved.
     void set_error_seconds(double seconds) { error_seconds_ = seconds; }
 
-    bool can_spend(double seconds) const { return spent_ + seconds <= kShare * this->seconds(); }
+    bool can_spend(double seconds) const {
+        return spent_ + seconds <= kPlannedShare * this->seconds();
+    }
+    /// What pilots may take at most.
+    double left() const { return std::max(0.0, kShare * seconds() - spent_); }
     /// Whether it would be a small part of the rendering.
     static bool is_small(double seconds, double of) { return seconds <= kShare * of; }
     void spend(double seconds) { spent_ += seconds; }
     double spent() const { return spent_; }
 
 private:
+    double plausible_error_seconds() const {
+        return std::max(1.0, kPlausibleError / sqr(*limits_.error)) * pixels_ * sample_seconds_;
+    }
+
     RenderLimits limits_;
     double pixels_, sample_seconds_;
-    double error_seconds_ = std::numeric_limits<double>::infinity();
+    std::optional<double> error_seconds_;
     double spent_ = 0;
 };
 
@@ -152,7 +167,8 @@ public:
     Choosing(const Scene& scene, const RenderSettings& settings, const std::atomic<bool>& drop)
         : scene_(scene), drop_(drop), settings_(settings),
           asked_(settings.integrator, auto_entry().info),
-          budget_(settings, whole_pixels(), typical_sample_seconds("path")),
+          budget_(settings, threads_of_auto(asked_), whole_pixels(),
+                  typical_sample_seconds("path")),
           contenders_(contenders(scene, asked_, settings.ranks->count())) {
         settings_.choice = nullptr;
         settings_.first_pass = 0;
@@ -173,7 +189,7 @@ public:
             if (!(is_first ? has_time_for_two(pixels) : has_time_for_all(pixels))) break;
             if (!is_first) add_guides(pixels);
             if (contenders_.size() < 2) break;
-            try_all(pixels, is_first);
+            if (!try_all(pixels, is_first) || contenders_.empty()) break;
             drop_hopeless();
         }
         MethodChoice choice;
@@ -183,7 +199,8 @@ public:
         const bool has_seen_noise =
             std::any_of(choice.candidates.begin(), choice.candidates.end(),
                         [](const auto& k) { return k.images > 0 && k.error() > 0; });
-        const bool differs = contenders_.front().has_light != contenders_.back().has_light;
+        const bool differs =
+            !contenders_.empty() && contenders_.front().has_light != contenders_.back().has_light;
         const std::string best =
             has_seen_noise || differs ? contenders_.front().method() : kWithoutPilots;
         std::stable_partition(choice.candidates.begin(), choice.candidates.end(),
@@ -223,10 +240,15 @@ private:
     /// Simulated seconds of pilots of a contender.
     double cost_of(const Contender& c, double pixels) const {
         if (c.shown.images > 0) return c.pilot_seconds(pixels);
+        if (!c.unguided.empty())
+            for (const Contender& known : contenders_)
+                if (known.method() == c.unguided)
+                    return guided_factor(true) * known.pilot_seconds(pixels);
         // Of the cheapest method it is known what a sample takes in this scene.
         const double slower =
             cheapest_ > 0 ? cheapest_ / typical_sample_seconds(cheapest_method_) : 1.0;
-        return kPilotReplicates * kPilotPasses * pixels * slower * typical_sample_seconds(c.name());
+        return (c.decides_on_specular(scene_) ? typical_specular_pilot_seconds() : 0) +
+               kPilotReplicates * kPilotPasses * pixels * slower * typical_sample_seconds(c.name());
     }
     double pixels_of(double pixels) const {
         const auto [width, height] = size_of_pilot(scene_.film(), pixels);
@@ -245,37 +267,57 @@ private:
     }
     bool has_time_for_all(double pixels) const { return budget_.can_spend(cost_of_all(pixels)); }
 
-    /// Pilots of all contenders on a film of so many pixels; at first, of those for which there is time. Puts the contenders
-    /// in order.
-    void try_all(double pixels, bool is_first) {
+    /// Pilots of all contenders on a film of so many pixels. Puts the contenders in order. Those of which there were none yet
+    /// are left out where there is no time for them. Where there is too little for another one, the result is false: then the
+    /// pilots do not count, and the order stays.
+    bool try_all(double pixels, bool is_first) {
         const auto [width, height] = size_of_pilot(scene_.film(), pixels);
         const Scene small = scene_.seen_by_film(width, height);
+        const double each = double(width) * double(height);
+        double cost_of_others = is_first ? 0 : cost_of_all(pixels);
         std::vector<Contender> tried;
-        for (Contender& c : contenders_) {
+        std::vector<MethodChoice::Candidate> untried;
+        for (Contender c : contenders_) {
+            const double cost = cost_of(c, each);
             const bool can_wait = is_first && tried.size() >= 2;
-            if (can_wait && !budget_.can_spend(cost_of(c, double(width) * double(height)))) {
-                untried_.push_back(c.shown);
+            if (can_wait && !budget_.can_spend(cost)) {
+                untried.push_back(c.shown);
                 continue;
             }
-            if (is_first && c.decides_on_specular(scene_)) budget_.spend(specular_pilot_seconds());
-            c.pilot = pilot_of(small, c);
-            if (cheapest_ == 0) {
-                cheapest_ = c.pilot.pass_seconds / (double(width) * double(height));
+            if (!is_first) cost_of_others -= cost;
+            c.pilot = pilot_of(small, c, budget_.left() - std::max(0.0, cost_of_others));
+            if (c.pilot.is_stopped) {
+                if (c.shown.images > 0) {
+                    // Those that are new in this round.
+                    std::erase_if(contenders_, [&](const Contender& k) {
+                        if (k.shown.images == 0) untried_.push_back(k.shown);
+                        return k.shown.images == 0;
+                    });
+                    return false;
+                }
+                untried.push_back(c.shown);
+                continue;
+            }
+            c.prepared_seconds += c.pilot.prepared_seconds;
+            if (is_first && (cheapest_ == 0 || c.pilot.pass_seconds < cheapest_ * each)) {
+                cheapest_ = c.pilot.pass_seconds / each;
                 cheapest_method_ = c.method();
                 budget_.set_sample_seconds(cheapest_);
             }
             tried.push_back(std::move(c));
         }
         contenders_ = std::move(tried);
-        judge(width, height);
+        untried_.insert(untried_.end(), untried.begin(), untried.end());
+        if (!contenders_.empty()) judge(width, height);
+        return true;
     }
 
-    MethodPilot pilot_of(const Scene& small, const Contender& c) {
+    MethodPilot pilot_of(const Scene& small, const Contender& c, double most) {
         RenderSettings settings = settings_;
         settings.integrator = spec_of(c.in_pilots);
         settings.integrator.guide = c.guide;
         settings.integrator.specular_pilots = specular_pilots_;
-        const MethodPilot pilot = render_pilot(small, settings, number_, drop_);
+        const MethodPilot pilot = render_pilot(small, settings, number_, most, drop_);
         number_ += kPilotReplicates;
         budget_.spend(pilot.all_seconds);
         return pilot;
@@ -365,13 +407,20 @@ private:
         for (size_t i = 0; i < factors.size(); ++i) contenders_[i].shown.noise *= factors[i];
     }
 
-    /// Of what is made once before the passes of the whole rendering.
+    /// Of what the whole rendering makes once.
     double start_seconds(const Contender& c, double pixels) const {
-        // Chains begin with samples, one or two for each pixel; see run_pilot().
+        // Chains begin with samples, one or two for each pixel; see run_pilot(). Other methods make a costlier first pass.
         constexpr double kMostSamples = 1 << 17;
-        const double chains =
-            c.pilot.start_seconds * std::max(1.0, std::min(whole_pixels(), kMostSamples) / pixels);
-        return chains + (c.guide ? training_seconds(walks_of_training()) : 0);
+        const double begun =
+                         c.has_chains() ? std::min(whole_pixels(), kMostSamples) : whole_pixels(),
+                     first = c.pilot.start_seconds * std::max(1.0, begun / pixels);
+        return first + c.prepared_seconds + (is_specular(c) ? specular_photon_seconds() : 0) +
+               (c.guide ? training_seconds(walks_of_training()) : 0);
+    }
+    /// Whether the method has decided for specular connections.
+    bool is_specular(const Contender& c) const {
+        const auto pilot = specular_pilots_->by_method.find(c.name());
+        return pilot != specular_pilots_->by_method.end() && pilot->second.is_worthwhile();
     }
 
     void drop_hopeless() {
@@ -412,6 +461,7 @@ private:
             more.back().in_pilots = c.method() + ":guide=on";
             more.back().guide = guide;
             more.back().unguided = c.method();
+            more.back().prepared_seconds = c.prepared_seconds;
         }
         contenders_.insert(contenders_.end(), more.begin(), more.end());
     }

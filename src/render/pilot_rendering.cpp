@@ -57,40 +57,54 @@ private:
     std::vector<float> before_;
 };
 
-void add_replicate(const Scene& small, RenderSettings settings, uint64_t number,
+/// Renders replicate r of a pilot that must not take more than `most` simulated seconds.
+void add_replicate(const Scene& small, RenderSettings settings, uint64_t first, int r, double most,
                    const std::atomic<bool>& drop, MethodPilot& pilot) {
-    settings.seed = pilot_seed(settings.seed, PilotUse::Choice, number);
+    const Guide* guide = settings.integrator.guide.get();
+    const auto cost = [method = settings.integrator.name,
+                       is_guided = guide && guide->guides_surfaces()](const RenderStats& stats) {
+        return simulated_seconds(method, is_guided, stats);
+    };
+    settings.seed = pilot_seed(settings.seed, PilotUse::Choice, first + uint64_t(r));
     static_cast<RenderLimits&>(settings) = {.spp = kPilotPasses, .seconds = {}, .error = {}};
+    // Those that follow cost as much as this one.
+    const double renderings = kPilotReplicates - r, left = most - pilot.all_seconds;
+    settings.cost_limit = CostLimit{.cost = cost, .most = left, .renderings = renderings};
     Renderer renderer(small, settings);
     const int groups = renderer.integrator().error_groups();
-    // What methods learn, they learn before the first pass and after it. Chains begin in the first pass of their group.
-    const uint64_t first = renderer.integrator().is_learning() ? 1 : 0,
-                   costs_from = groups > 0 ? uint64_t(groups) : first;
-    const Guide* guide = settings.integrator.guide.get();
-    const bool is_guided = guide && guide->guides_surfaces();
-    ReplicateImages made(groups, first);
-    double seconds = 0, first_seconds = 0;
+    // Methods that learn do so before the first pass and after it. Chains begin in the first pass of their group.
+    const uint64_t first_image = renderer.integrator().is_learning() ? 1 : 0,
+                   costs_from = groups > 0 ? uint64_t(groups) : 1;
+    ReplicateImages made(groups, first_image);
+    double first_seconds = 0;
     const StopReason reason = renderer.run(
         settings,
         [&](const Progress& p) {
             made.add(renderer.film(), p.passes - 1);
-            seconds = simulated_seconds(settings.integrator.name, is_guided, renderer.stats());
-            if (p.passes == costs_from) first_seconds = seconds;
+            if (p.passes == costs_from) first_seconds = cost(renderer.stats());
         },
         drop, drop);
-    if (reason == StopReason::Interrupted) throw PassDropped();
-
+    const double prepared = cost(renderer.preparation()), seconds = cost(renderer.stats());
+    if (reason == StopReason::Interrupted) {
+        if (drop.load()) throw PassDropped();
+        // What it was allowed to take, since what threads have done until then depends on their number.
+        pilot.all_seconds +=
+            renderer.is_prepared() ? prepared + std::max(0.0, left - prepared) / renderings : left;
+        pilot.is_stopped = true;
+        return;
+    }
     pilot.passes_per_image = made.passes_per_image();
     pilot.images.in_sequence =
         settings.sampler == SamplerKind::Sobol && groups == 0 ? int(made.images.size()) : 1;
     for (auto& image : made.images) pilot.images.images.push_back(std::move(image));
     const double pass = (seconds - first_seconds) / double(kPilotPasses - costs_from);
     pilot.pass_seconds += pass / kPilotReplicates;
-    pilot.all_seconds += seconds;
-    if (groups == 0) return;
-    pilot.images.least_variance = 1 / (mutations_of(renderer) * pilot.passes_per_image);
+    pilot.prepared_seconds += prepared;
+    pilot.all_seconds += prepared + seconds;
     pilot.start_seconds +=
         std::max(0.0, first_seconds - double(costs_from) * pass) / kPilotReplicates;
+    if (groups > 0)
+        pilot.images.least_variance = 1 / (mutations_of(renderer) * pilot.passes_per_image);
 }
 
 }  // namespace
@@ -104,10 +118,11 @@ std::pair<int, int> size_of_pilot(const FilmGeometry& film, double pixels) {
 }
 
 MethodPilot render_pilot(const Scene& small, const RenderSettings& settings, uint64_t first,
-                         const std::atomic<bool>& drop) {
+                         double most, const std::atomic<bool>& drop) {
     MethodPilot pilot;
-    for (uint64_t r = 0; r < kPilotReplicates; ++r)
-        add_replicate(small, settings, first + r, drop, pilot);
+    for (int r = 0; r < kPilotReplicates && !pilot.is_stopped; ++r)
+        add_replicate(small, settings, first, r, most, drop, pilot);
+    if (pilot.is_stopped) pilot.images.images.clear();
     return pilot;
 }
 

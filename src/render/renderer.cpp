@@ -359,7 +359,8 @@ class Renderer::Pass {
 public:
     /// The pass that follows `passes` others.
     Pass(Renderer& renderer, uint32_t passes, const std::atomic<bool>& drop)
-        : r_(renderer), drop_(drop), passes_(passes),
+        : r_(renderer), drop_(drop), passes_(passes), limit_(r_.settings_.cost_limit),
+          cost_(limit_ ? r_.cost() : 0), cost_factor_(limit_ ? limit_->renderings : 1),
           index_(uint32_t(r_.settings_.first_pass) + passes), numbers_(r_.numbers(passes)),
           splat_scale_(r_.light_paths_ > 0 ? float(1.0 / double(r_.light_paths_)) : 0.0f) {}
 
@@ -372,9 +373,10 @@ public:
                                .so_far = r_.stats_});
     }
     void prepare() {
+        cost_factor_ = 1;
         r_.integrator_->prepare(context());
-        // These paths do not count.
-        r_.workers_->take_stats();
+        // These paths are no part of the image.
+        r_.preparation_ += r_.workers_->take_stats();
         r_.workers_->drop_sums();
     }
     /// What the samples share.
@@ -404,6 +406,27 @@ private:
     void go_on() const {
         if (drop_.load(std::memory_order_relaxed)) throw PassDropped();
     }
+    /// Adds what a worker has done to the cost of the pass, and ends the pass where it is too high.
+    class CostMeter {
+    public:
+        CostMeter(const Pass& pass, const Workspace& work)
+            : pass_(pass), work_(work), before_(cost()) {}
+        void update() {
+            if (!pass_.limit_) return;
+            // The sum has rounding errors that depend on the order. Where it is too high, the exact one is, too.
+            constexpr double kRounding = 1e-6;
+            const double now = cost(),
+                         more = pass_.cost_factor_ * (now - std::exchange(before_, now));
+            if (pass_.cost_.fetch_add(more) + more > (1 + kRounding) * pass_.limit_->most)
+                throw PassDropped();
+        }
+
+    private:
+        double cost() const { return pass_.limit_ ? pass_.limit_->cost(work_.stats) : 0; }
+        const Pass& pass_;
+        const Workspace& work_;
+        double before_;
+    };
     Workspace& workspace() const {
         Workspace& work = r_.workers_->spaces.local();
         work.is_observed = r_.settings_.observer != nullptr;
@@ -425,7 +448,8 @@ private:
     class SamplesInTurn {
     public:
         SamplesInTurn(const Pass& pass, uint64_t chunk)
-            : pass_(pass), chunk_(chunk), work_(pass.workspace()), sink_(pass.receivers(work_)),
+            : pass_(pass), chunk_(chunk), work_(pass.workspace()), meter_(pass, work_),
+              sink_(pass.receivers(work_)),
               samplers_(kWalksInTurn, Sampler(pass.r_.settings_.sampler, pass.numbers_.seed)) {
             contexts_.reserve(kWalksInTurn);
             work_.eye_paths.resize(kWalksInTurn);
@@ -455,6 +479,7 @@ private:
                 sink_.begin(c.index, c.light_paths);
                 integrator.sample(c, work_);
                 sink_.end();
+                meter_.update();
             }
         }
 
@@ -462,6 +487,7 @@ private:
         const Pass& pass_;
         uint64_t chunk_;
         Workspace& work_;
+        CostMeter meter_;
         FilmSink sink_;
         std::vector<Sampler> samplers_;
         std::vector<SampleContext> contexts_;
@@ -472,6 +498,7 @@ private:
     void for_each_sample(uint64_t count, const Use& use) const {
         parallel_for(chunks(count), [&](uint64_t chunk) {
             Workspace& work = workspace();
+            CostMeter meter(*this, work);
             Sampler sampler(r_.settings_.sampler, numbers_.seed);
             FilmSink sink(receivers(work));
             const uint64_t end = std::min(count, (chunk + 1) * kChunk);
@@ -480,6 +507,7 @@ private:
                 sampler.start(numbers_.pass, i);
                 work.stats.time_factor = RenderStats::time_factor_of(i);
                 use(sample_context(i, chunk, sampler, sink), work);
+                meter.update();
             }
         });
     }
@@ -502,8 +530,10 @@ private:
                         Sampler sampler(r_.settings_.sampler,
                                         pilot_seed(numbers_.seed, PilotUse::OtherPaths));
                         Workspace& work = workspace();
+                        CostMeter meter(*this, work);
                         work.stats.time_factor = RenderStats::time_factor_of(i);
                         task(i, sampler, work);
+                        meter.update();
                     });
                 },
             .for_each_chain =
@@ -511,10 +541,12 @@ private:
                     parallel_for(count, [&](uint64_t i) {
                         go_on();
                         Workspace& work = workspace();
+                        CostMeter meter(*this, work);
                         FilmSplats splats(receivers(work));
                         work.is_observed = splats.needs_joins();
                         task(i, splats, work);
                         splats.flush();
+                        meter.update();
                     });
                 },
             .forget_statistics = [this] { r_.workers_->take_stats(); }};
@@ -522,7 +554,11 @@ private:
 
     Renderer& r_;
     const std::atomic<bool>& drop_;
-    uint32_t passes_, index_;
+    uint32_t passes_;
+    const std::optional<CostLimit>& limit_;
+    mutable std::atomic<double> cost_;  ///< So far, of what counts for the limit.
+    double cost_factor_;
+    uint32_t index_;
     Numbers numbers_;
     float splat_scale_;
 };
@@ -804,6 +840,7 @@ int Renderer::round_size(const RenderLimits& limits) const {
 std::optional<StopReason> Renderer::reached(const RenderLimits& limits,
                                             const std::optional<ErrorEstimate>& error) const {
     if (film_.passes() == 0) return {};
+    if (settings_.cost_limit && cost() > settings_.cost_limit->most) return StopReason::Interrupted;
     if (film_.passes() >= limits.spp.value_or(kMostPasses - settings_.first_pass))
         return StopReason::Samples;
     if (limits.error && error && error->valid && error->relative_rms <= *limits.error)

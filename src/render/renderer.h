@@ -43,6 +43,16 @@ struct RenderOptions : RenderLimits {
 
 struct MethodChoice;
 
+/// Ends a rendering in the pass, or in what precedes the first one, by which it would cost more. Whether it ends does not
+/// depend on the number of threads: it does if the whole pass would cost more.
+struct CostLimit {
+    std::function<double(const RenderStats&)> cost;
+    double most;
+    /// Passes count so many times, and Integrator::prepare() once: of several such renderings, which must not cost more
+    /// together, only the first one prepares anything.
+    double renderings = 1;
+};
+
 struct RenderSettings : RenderOptions {
     IntegratorSpec integrator{"path", {}};
     /// How `integrator` was chosen, if `auto` did it; see with_chosen_method().
@@ -59,6 +69,8 @@ struct RenderSettings : RenderOptions {
     /// At most kGenerationBytes are, or those of one generation; what was learned first is given up first. None where there is
     /// no memory for it.
     bool keeps_generations = false;
+    /// run() then ends as if it were interrupted, and the pass is discarded. For pilots.
+    std::optional<CostLimit> cost_limit = {};
     /// The processes that render the image together, each of them by a Renderer with these settings. They must outlive it.
     const Ranks* ranks = &kAlone;
 };
@@ -169,6 +181,15 @@ public:
     /// As given, but with the method that `auto` has chosen.
     const RenderSettings& settings() const { return settings_; }
     const RenderStats& stats() const { return stats_; }  ///< Statistics of the finished passes.
+    /// Of what Integrator::prepare() has traced, which is no part of stats(), nor of a state that was loaded.
+    const RenderStats& preparation() const { return preparation_; }
+    /// Whether Integrator::prepare() has ended for the last pass that was begun.
+    bool is_prepared() const { return is_prepared_; }
+    /// What counts for CostLimit; for renderers that have one.
+    double cost() const {
+        const CostLimit& limit = *settings_.cost_limit;
+        return limit.cost(preparation_) + limit.renderings * limit.cost(stats_);
+    }
     /// Time of the finished passes in run(), and of the choice of the method before the first.
     double seconds() const { return seconds_; }
     ErrorEstimate error() const;  ///< Of the film, computed by the threads of this renderer.
@@ -231,7 +252,7 @@ private:
     std::shared_ptr<const Generation> replayed_;  ///< Of trace_again().
     int last_rank_ = -1;  ///< The process whose state is that after the last pass; -1: of each.
     bool ended_together_ = true, pass_failed_ = false;  ///< In the last run().
-    RenderStats stats_;
+    RenderStats stats_, preparation_;
     double seconds_ = 0;
 };
 

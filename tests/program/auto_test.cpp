@@ -53,7 +53,7 @@ protected:
     }
 
     TemporaryFolder folder;
-    std::string scene = fs::path(ETENDUE_SOURCE_DIR) / "scenes/ring.xml";
+    std::string scene = fs::path(ETENDUE_SOURCE_DIR) / "scenes/cornell.xml";
 };
 
 /// Enough for pilots of several methods.
@@ -107,6 +107,41 @@ TEST_F(AutoTest, RendersScenesThatNameNoIntegrator) {
         run({"render", file, "-o", path("a.exr"), "--resolution", "8x6", "--spp", "2"});
     EXPECT_EQ(r.status, 0) << r.errors;
     EXPECT_NE(r.errors.find("auto: bdpt, without pilots"), std::string::npos) << r.errors;
+}
+
+/// The choice without a rendering: as text, and as JSON the same as in the statistics of a rendering.
+TEST_F(AutoTest, InfoShowsTheChoice) {
+    const auto info = [&](const Arguments& more) {
+        Arguments all{"info", scene, "--resolution", "64x48", "--choice"};
+        all.insert(all.end(), more.begin(), more.end());
+        return run(all);
+    };
+    render("a", with(kHow, {"--seed", "3"}));
+    auto rendered = report("a")["auto"];
+    const ProgramResult r = info(with(kHow, {"--seed", "3", "--json", "--threads", "1"}));
+    ASSERT_EQ(r.status, 0) << r.errors;
+    auto shown = nlohmann::json::parse(r.output)["choice"];
+    for (auto* of : {&rendered, &shown}) of->erase("seconds");
+    EXPECT_EQ(shown, rendered);
+
+    const ProgramResult text = info(with(kHow, {"--seed", "3"}));
+    EXPECT_EQ(text.status, 0) << text.errors;
+    for (const auto& c : shown["candidates"])
+        EXPECT_NE(text.output.find("    " + c["method"].get<std::string>() + " "),
+                  std::string::npos)
+            << text.output;
+    // Where pilots would take too long, too.
+    EXPECT_NE(info({"--spp", "1"}).output.find("no pilot"), std::string::npos);
+
+    const auto expect_refusal = [&](const ProgramResult& refused, const std::string& message) {
+        EXPECT_EQ(refused.status, 2);
+        EXPECT_EQ(refused.output, "");
+        EXPECT_NE(refused.errors.find(message), std::string::npos) << refused.errors;
+    };
+    expect_refusal(info({"-i", "bdpt"}), "-i must be auto");
+    expect_refusal(info({"--guide"}), "--guide");
+    expect_refusal(run({"info", scene, "--seed", "1"}), "--seed requires --guide or --choice");
+    expect_refusal(run({"info", scene, "--time", "1"}), "--choice");
 }
 
 /// As while a scene is loaded: there is nothing to write yet.

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <limits>
+#include <optional>
 #include <thread>
 
 #include <fmt/format.h>
@@ -166,26 +168,65 @@ TEST(MethodChoice, ProcessesThatRenderTogetherChooseTheSameWithoutChains) {
     });
 }
 
+/// The same choice as for so many times the seconds, whatever the number of threads that render.
+TEST(MethodChoice, SecondsAreThoseOfTheGivenThreads) {
+    const Scene scene = scene_of_project("ring.xml", 160, 120);
+    const MethodChoice many = choice_of(scene, "auto:chains=false,threads=32", 0.25),
+                       one = choice_of(scene, "auto:chains=false", 8);
+    EXPECT_EQ(many.budget, 8);
+    EXPECT_EQ(many.pilots, one.pilots);
+    EXPECT_EQ(many.chosen, one.chosen);
+    // Other limits have no seconds.
+    RenderSettings settings = settings_of(scene, "auto:chains=false,threads=32", 0);
+    settings.seconds = {};
+    settings.spp = 400;
+    const double budget = with_chosen_method(scene, settings).choice->budget;
+    settings.integrator = choose_integrator(scene, "auto:chains=false");
+    EXPECT_EQ(budget, with_chosen_method(scene, settings).choice->budget);
+}
+
 TEST(MethodChoice, PilotsTakeASmallPart) {
     const Scene scene = scene_of_project("cornell.xml", 200, 200);
     for (const double seconds : {0.01, 0.1, 0.5, 2.0, 8.0}) {
         SCOPED_TRACE(seconds);
         const MethodChoice c = choice_of(scene, "auto", seconds);
         EXPECT_DOUBLE_EQ(c.budget, seconds);
-        // The first pilot of a scene may be dearer than those of a usual one.
-        EXPECT_LE(c.pilots, 0.12 * c.budget);
+        EXPECT_LE(c.pilots, 0.08 * c.budget);
     }
     // With guides and all chains.
     const Scene ring = scene_of_project("ring.xml", 480, 360);
     for (const double seconds : {10.0, 14.0, 30.0}) {
         SCOPED_TRACE(seconds);
-        EXPECT_LE(choice_of(ring, "auto", seconds).pilots, 0.085 * seconds);
+        EXPECT_LE(choice_of(ring, "auto", seconds).pilots, 0.08 * seconds);
     }
     // No pilots where they would take longer than that.
     const MethodChoice none = choice_of(scene, "auto", 0.001);
     EXPECT_EQ(none.chosen, "bdpt");
     EXPECT_EQ(none.pilots, 0);
     EXPECT_NE(none.message().find("without pilots"), std::string::npos);
+}
+
+/// Specular connections in glass take many times what samples of other scenes do, which nothing tells before the first pilots.
+TEST(MethodChoice, CostlyPilotsAreStopped) {
+    const Scene scene = build(lantern_room(front_camera(128)));
+    for (const double seconds : {1.5, 2.0, 3.0, 8.0}) {
+        SCOPED_TRACE(seconds);
+        RenderSettings settings = settings_of(scene, "auto", seconds);
+        std::string first;
+        for (const int threads : {1, 3}) {
+            settings.threads = threads;
+            MethodChoice c = *with_chosen_method(scene, settings).choice;
+            EXPECT_GT(c.pilots, 0);
+            EXPECT_LE(c.pilots, 0.08 * seconds);
+            c.seconds = 0;
+            if (first.empty()) first = c.to_json().dump();
+            EXPECT_EQ(c.to_json().dump(), first);
+            // What renders although its pilots were stopped is the method that renders without pilots.
+            if (c.candidates.front().images == 0) {
+                EXPECT_EQ(c.chosen, "bdpt");
+            }
+        }
+    }
 }
 
 TEST(MethodChoice, PilotsTakeNoMoreThanAnErrorNeeds) {
@@ -198,6 +239,9 @@ TEST(MethodChoice, PilotsTakeNoMoreThanAnErrorNeeds) {
     const MethodChoice tight = *with_chosen_method(scene, settings).choice;
     EXPECT_LT(loose.budget, 0.1 * tight.budget);
     EXPECT_LT(loose.pilots, tight.pilots);
+    // Before the first pilots, the rendering is not taken to be longer than that of a simple scene.
+    settings.error = 2;
+    EXPECT_EQ(with_chosen_method(scene, settings).choice->pilots, 0);
 }
 
 TEST(MethodChoice, CandidatesAreThoseThatMayBe) {
@@ -264,7 +308,7 @@ TEST(MethodChoice, IsTheDefaultOfScenesWithoutIntegrator) {
 /// Those of which there was no time for pilots are told, too.
 TEST(MethodChoice, TellsOfAllCandidates) {
     const Scene scene = scene_of_project("cornell.xml", 200, 200);
-    const MethodChoice c = choice_of(scene, "auto", 0.6);
+    const MethodChoice c = choice_of(scene, "auto", 0.7);
     EXPECT_EQ(methods_of(c),
               (std::vector<std::string>{"bdpt", "mlt", "mmlt", "path", "pcbpt", "upg+bdpt"}));
     EXPECT_GT(c.candidates.front().images, 0);
@@ -278,10 +322,12 @@ TEST(MethodChoice, ParametersAreThoseOfTheMethod) {
     const IntegratorSpec spec = IntegratorSpec::parse(c.chosen);
     EXPECT_EQ(spec.params.at("max_depth"), "4");
     EXPECT_EQ(spec.params.size(), 1u);
-    EXPECT_EQ(c.asked, "auto:chains=false,consistent=false,max_depth=4");
+    EXPECT_EQ(c.asked, "auto:chains=false,consistent=false,max_depth=4,threads=1");
     EXPECT_NE(error_of([&] { choice_of(scene, "auto:depth=4"); }).find("max_depth"),
               std::string::npos);
     EXPECT_NE(error_of([&] { choice_of(scene, "auto:chains=perhaps"); }).find("true or false"),
+              std::string::npos);
+    EXPECT_NE(error_of([&] { choice_of(scene, "auto:threads=0"); }).find("threads"),
               std::string::npos);
 }
 
@@ -303,6 +349,8 @@ TEST(MethodChoice, IsWrittenAndRead) {
     EXPECT_NE(error_of([] { MethodChoice::from_json("{}"); }).find("damaged"), std::string::npos);
     EXPECT_NE(error_of([] { MethodChoice::from_json("no"); }).find("damaged"), std::string::npos);
 }
+
+constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
 /// The images of the passes of a rendering, in grey.
 std::vector<std::vector<float>> passes_of(const Scene& scene, RenderSettings settings) {
@@ -336,7 +384,7 @@ TEST(Pilots, HaveNoPassOfTheRendering) {
             settings.sampler = sampler;
             settings.seed = 7;
             const auto own = passes_of(scene, settings);
-            const MethodPilot pilot = render_pilot(scene, settings, 0, never);
+            const MethodPilot pilot = render_pilot(scene, settings, 0, kNoLimit, never);
             std::vector<std::vector<float>> all = pilot.images.images;
             ASSERT_GE(all.size(), size_t(2 * kPilotReplicates));
             // The comparison can find equal ones.
@@ -351,6 +399,56 @@ TEST(Pilots, HaveNoPassOfTheRendering) {
         }
 }
 
+/// A pilot that would take too much is stopped, and books what it was allowed to take.
+TEST(Pilots, AreStopped) {
+    const Scene scene = build(lantern_room(front_camera(24)));
+    const std::atomic<bool> never{false};
+    for (const char* method : {"path", "upg+bdpt", "mlt:groups=2,chains=16"}) {
+        SCOPED_TRACE(method);
+        RenderSettings settings = settings_of(scene, method, 1);
+        const MethodPilot whole = render_pilot(scene, settings, 0, kNoLimit, never);
+        ASSERT_FALSE(whole.is_stopped);
+        const double passes = kPilotPasses * whole.pass_seconds + whole.start_seconds;
+        EXPECT_NEAR(whole.all_seconds, whole.prepared_seconds + kPilotReplicates * passes,
+                    0.01 * whole.all_seconds);
+        // Of all, of what the first one shows, and of what precedes its passes.
+        for (const double share : {0.9, 0.5, 0.02}) {
+            const double most = share * whole.all_seconds;
+            std::optional<double> taken;
+            for (const int threads : {1, 3}) {
+                settings.threads = threads;
+                const MethodPilot pilot = render_pilot(scene, settings, 0, most, never);
+                EXPECT_TRUE(pilot.is_stopped);
+                EXPECT_TRUE(pilot.images.images.empty());
+                EXPECT_LE(pilot.all_seconds, most);
+                if (!taken) taken = pilot.all_seconds;
+                EXPECT_EQ(pilot.all_seconds, *taken);
+            }
+        }
+        EXPECT_EQ(render_pilot(scene, settings, 0, 1.5 * whole.all_seconds, never).images.images,
+                  whole.images.images);
+    }
+}
+
+/// What is decided about specular connections, and what the first pass costs more.
+TEST(Pilots, BookWhatPrecedesTheFirstPass) {
+    const Scene scene = build(lantern_room(front_camera(24)));
+    const std::atomic<bool> never{false};
+    for (const char* method : {"path", "bdpt", "upg+bdpt"}) {
+        SCOPED_TRACE(method);
+        const MethodPilot pilot =
+            render_pilot(scene, settings_of(scene, method, 1), 0, kNoLimit, never);
+        EXPECT_GT(pilot.prepared_seconds, 0);
+        // Joins have Russian roulette once there is an image; specular connections have it from the start.
+        if (std::string(method) != "path") {
+            EXPECT_GT(pilot.start_seconds, 0);
+        }
+    }
+    const Scene plain = build(front_camera(24) + room() + area_lamp());
+    EXPECT_EQ(
+        render_pilot(plain, settings_of(plain, "path", 1), 0, kNoLimit, never).prepared_seconds, 0);
+}
+
 /// Passes of a Sobol' sequence have less noise together than as many independent ones. Pilots see a part of that, since they
 /// have few passes.
 TEST(Pilots, PredictWhatTheSamplerGains) {
@@ -360,7 +458,7 @@ TEST(Pilots, PredictWhatTheSamplerGains) {
     RenderSettings settings = settings_of(scene, "path", 1);
     settings.seconds = {};
     const auto predicted = [&] {
-        PilotImages pilot = render_pilot(scene, settings, 0, never).images;
+        PilotImages pilot = render_pilot(scene, settings, 0, kNoLimit, never).images;
         pilot.horizon = double(kSpp);
         return score_pilots({&pilot, 1}, 64, 64).front().error();
     };
