@@ -90,7 +90,7 @@ public:
     void save(LearnedState& to) const override { paths_.save(to); }
     void load(LearnedState& from) override { paths_.load(from); }
     void prepare(const PassContext& pass) override {
-        paths_.train(pass);
+        paths_.train(pass, counts(pass.scene, pass.light_paths));
         paths_.prepare_specular(pass, counts(pass.scene, pass.light_paths));
     }
 
@@ -112,7 +112,8 @@ public:
         return given_light_paths_ > 0 ? given_light_paths_ : scene.film().pixel_count();
     }
     bool samples_alone(const Scene& scene) const override {
-        return !paths_.guiding().is_on() && !paths_.specular().is_prepared_for(scene);
+        return !paths_.guiding().is_prepared_for(scene) &&
+               !paths_.specular().is_prepared_for(scene);
     }
     Estimator estimator() const override { return Estimator::Unbiased; }
     std::vector<std::pair<std::string, double>> figures() const override {
@@ -136,6 +137,7 @@ IntegratorEntry bdpt_entry() {
                        "Number of light paths in a pass; pixel i connects to light path i modulo "
                        "light_paths. 0: one for each pixel."}},
                      Specular::params(),
+                     Guiding::lights_params(),
                      Guiding::params()})},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<BdptIntegrator>(p);

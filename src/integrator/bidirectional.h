@@ -33,8 +33,9 @@ public:
     }
 
     /// Trains the guide. For Integrator::prepare().
-    void train(const PassContext& pass, GuidedWalks walks = GuidedWalks::Both) {
-        guiding_.train(pass, depth_, walks);
+    void train(const PassContext& pass, const TechniqueCounts& counts,
+               GuidedWalks walks = GuidedWalks::Both) {
+        guiding_.train(pass, counts, depth_, walks);
     }
 
     /// See Specular::prepare(). For Integrator::prepare(), after train().

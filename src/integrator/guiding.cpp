@@ -5,6 +5,7 @@
 #include <chrono>
 #include <map>
 
+#include "integrator/shared_by_pilots.h"
 #include "math/hash.h"
 #include "sampler/pilot_seed.h"
 
@@ -85,6 +86,11 @@ void record(const GuideSample& s, Block& block) {
     if (s.weight > 0) block.samples.push_back(s);
 }
 
+/// With the part of the light that next events bring.
+Arrival arrival_of(const SubPath& y, float hits) {
+    return {{y[1].p, side_normal(y[1]), luminance(y[1].beta) * (1 - hits)}, y[0].emitter->index};
+}
+
 void record_light_walk(const SubPath& y, Block& block) {
     PlacedWeight arrival;
     for (int i = 1; i < y.size(); ++i) {
@@ -93,7 +99,7 @@ void record_light_walk(const SubPath& y, Block& block) {
         if (i == 1) {
             const float hits = share_of_hits(y);
             s.weight *= hits;
-            arrival = {y[1].p, side_normal(y[1]), luminance(y[1].beta) * (1 - hits)};
+            arrival = arrival_of(y, hits).at;
             block.left_out[s.mode].push_back(arrival);
         }
         record(s, block);
@@ -315,16 +321,21 @@ void learn_emission(const Scene& scene, const std::vector<EmissionRecord>& recor
 }
 
 /// The selection of emitters by next events is learned from the light that they bring. Where it gains little, that of
-/// everywhere stays, which takes less time.
-void learn_lights(const Scene& scene, const std::vector<EmissionRecord>& records, Guide& guide) {
+/// everywhere stays, which takes less time; the result is then empty.
+LightSelections learned_lights(const Scene& scene, std::vector<Arrival> arrivals) {
     constexpr float kLeastGain = 0.1f;  // in nats
-    if (!scene.has_emitter_choice()) return;
     std::vector<float> pmf;
     for (const auto& e : scene.emitters()) pmf.push_back(e->selection_pmf);
-    std::vector<Arrival> arrivals;
-    for (const EmissionRecord& r : records) arrivals.push_back({r.arrival, r.emitter->index});
     LightSelections lights(std::move(arrivals), pmf);
-    if (lights.gain() >= kLeastGain) guide.lights = std::move(lights);
+    return lights.gain() >= kLeastGain ? std::move(lights) : LightSelections();
+}
+
+/// A guide of next events alone; nullptr where they select by power.
+std::unique_ptr<Guide> guide_of_lights(LightSelections lights) {
+    if (lights.is_empty()) return nullptr;
+    auto guide = std::make_unique<Guide>();
+    guide->lights = std::move(lights);
+    return guide;
 }
 
 }  // namespace
@@ -337,8 +348,7 @@ std::vector<ParamInfo> Guiding::params(GuideRefits refits) {
               "pass. A refit traces as many, before the first of passes 1, 4, 16, 64 … at which "
               "the image has had 8, 64, 512 … times as many samples.";
     return {{"guide", ParamKind::String, "off",
-             "Learned directions for the walks, and lamps for next events: off, on, or auto (on, "
-             "unless the training shows "
+             "Learned directions for the walks: off, on, or auto (on, unless the training shows "
              "that it gains too little). hp02 (experimental, for comparisons) guides eye walks "
              "alone, by footprints of photons [Hey & Purgathofer 2002]."},
             {"guide_walks", ParamKind::Int, "100000", walks},
@@ -347,13 +357,23 @@ std::vector<ParamInfo> Guiding::params(GuideRefits refits) {
              "walks had from the same place on. Has no effect if `guide` is off."}};
 }
 
+std::vector<ParamInfo> Guiding::lights_params() {
+    return {{"lights", ParamKind::String, "learned",
+             "How next events select one of several emitters. learned: by the light that some "
+             "walks before the first pass bring to each place, if that gains enough. power: by "
+             "power, at every place. See the page on guided walks."}};
+}
+
 Guiding::Guiding(const IntegratorParams& p) {
     constexpr std::array<Choice<Mode>, 4> kModes{
         {{"off", Mode::Off}, {"on", Mode::On}, {"auto", Mode::Auto}, {"hp02", Mode::Footprints}}};
     mode_ = p.choice("guide", kModes);
     walks_ = uint64_t(p.integer("guide_walks", 256, 1 << 20));
     has_roulette_ = p.flag("guide_roulette");
+    constexpr std::array<Choice<bool>, 2> kLights{{{"learned", true}, {"power", false}}};
+    learns_lights_ = p.has("lights") && p.choice("lights", kLights);
     given_ = p.given_guide();
+    pilots_ = p.shared_by_pilots();
 }
 
 bool Guiding::gains_little(const Guide& guide, GuidedWalks walks) {
@@ -362,49 +382,81 @@ bool Guiding::gains_little(const Guide& guide, GuidedWalks walks) {
     // says little about methods that have both walks. Alone, eye walks gain 0.59 to 0.64 on veach-bidir, where the guide of
     // `path` pays, and 0.51 to 0.56 on many-lights, where it does not. With both walks they gain 2.9 on lantern and at most
     // 0.3 elsewhere; emission gains 1.3 and more, or less than 0.1.
-    constexpr float kLeastEyeGain = 1.0f, kLeastLightGain = 0.4f, kLeastGainOfLights = 0.5f;
+    constexpr float kLeastEyeGain = 1.0f, kLeastLightGain = 0.4f;
     const bool eye = guide.surfaces.gain(TransportMode::Radiance) >=
                      (walks == GuidedWalks::Eye ? kLeastGainAlone : kLeastEyeGain),
                light = guide.surfaces.gain(TransportMode::Importance) >= kLeastLightGain,
-               emission = guide.emission_gain >= kLeastLightGain,
-               lights = guide.lights.gain() >= kLeastGainOfLights;
+               emission = guide.emission_gain >= kLeastLightGain;
     switch (walks) {
-    case GuidedWalks::Eye: return !eye && !lights;
+    case GuidedWalks::Eye: return !eye;
     case GuidedWalks::Light: return !light && !emission;
     case GuidedWalks::Both:
-    case GuidedWalks::BothWithPairs: return !eye && !emission && !lights;
+    case GuidedWalks::BothWithPairs: return !eye && !emission;
     }
     return true;
-}
-
-bool Guiding::guides_surfaces_by_auto(const Guide& guide, GuidedWalks walks) {
-    return guide.uses_surfaces && (walks != GuidedWalks::Eye ||
-                                   guide.surfaces.gain(TransportMode::Radiance) >= kLeastGainAlone);
 }
 
 bool Guiding::gains_nothing(const Guide& guide, GuidedWalks walks) const {
     // Neither what emission gains nor adjoint-driven roulette depends on them. In the scenes of docs/guiding.md, one of the
     // two gains 2.9 nats, or both at most 0.3: on veach-bidir, where guided directions make a sample worse.
     constexpr float kLeastGain = 0.5f;
-    if (mode_ == Mode::Auto && !guides_surfaces_by_auto(guide, walks)) return true;
     return joins_both(walks) && mode_ != Mode::Footprints &&
            std::max(guide.surfaces.gain(TransportMode::Radiance),
                     guide.surfaces.gain(TransportMode::Importance)) < kLeastGain;
 }
 
-void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWalks walks,
-                    GuidedLight light) {
+void Guiding::train(const PassContext& pass, const TechniqueCounts& counts,
+                    const DepthOptions& depth, GuidedWalks walks, GuidedLight light) {
+    if (!pass.scene.has_emitters()) return;
+    const auto begin = Clock::now();
+    const bool selects = counts.next_event > 0 && selects_lights(pass.scene);
+    if (is_on())
+        train_walks(pass, depth, walks, light, selects);
+    else if (selects && pass.film.passes() == 0)
+        guide_ = guide_of_lights(trained_lights(pass, depth));
+    else
+        return;
+    seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+LightSelections Guiding::trained_lights(const PassContext& pass, const DepthOptions& depth) const {
+    constexpr uint64_t kWalks = 20000;
+    if (pilots_ && pilots_->lights) return *pilots_->lights;
+    const uint64_t seed = pilot_seed(pass.seed, PilotUse::Lights);
+    const TechniqueCounts counts = joins_of(GuidedWalks::Both, 1);
+    WalkOptions options = depth.walk();
+    options.max_vertices = std::min(options.max_vertices, 3);
+    std::vector<std::vector<Arrival>> blocks((kWalks + kBlock - 1) / kBlock);
+    pass.for_each_other_path(blocks.size(), [&](uint64_t b, Sampler&, Workspace& work) {
+        Sampler sampler(SamplerKind::Independent, seed);
+        RenderStats stats;  // not of the image
+        const WalkContext walk{pass.scene, counts, stats, options};
+        for (uint64_t i = b * kBlock; i < std::min(kWalks, (b + 1) * kBlock); ++i) {
+            sampler.start(0, i);
+            trace_light_path(walk, sampler, work.y);
+            if (work.y.size() > 1 && work.y[1].is_connectible)
+                blocks[b].push_back(arrival_of(work.y, share_of_hits(work.y)));
+        }
+    });
+    std::vector<Arrival> arrivals;
+    for (std::vector<Arrival>& b : blocks) move_to_end(arrivals, b);
+    LightSelections lights = learned_lights(pass.scene, std::move(arrivals));
+    if (pilots_) pilots_->lights = lights;
+    return lights;
+}
+
+void Guiding::train_walks(const PassContext& pass, const DepthOptions& depth, GuidedWalks walks,
+                          GuidedLight light, bool selects_lights) {
     constexpr int kRounds = 4;  // Each has twice the walks of the last.
     constexpr uint64_t kFirstPart = (1 << kRounds) - 1;
     const auto passes = uint32_t(pass.film.passes());
-    if (mode_ == Mode::Off || is_given_up_ || !pass.scene.has_emitters()) return;
+    if (is_given_up_) return;
     const uint64_t refits =
         (std::bit_width(std::max<uint64_t>(1, passes * pass.pixels / walks_)) - 1) / 3;
     // As many walks would not gain more where a guide gains nothing.
     const bool has_gain = guide_ && (guide_->uses_surfaces || !guide_->lights.is_empty()),
                is_due = passes == 0 || (has_gain && refits > refits_);
     if (!is_due) return;
-    const auto begin = Clock::now();
     const uint64_t seed = pilot_seed(pass.seed, PilotUse::Guide, passes);
     // The pass may be dropped at any time, and traced again: nothing may be left of this training then.
     std::unique_ptr<Guide> next;
@@ -413,29 +465,31 @@ void Guiding::train(const PassContext& pass, const DepthOptions& depth, GuidedWa
     } else if (passes == 0) {
         for (int round = 0; round < kRounds; ++round) {
             if (next) next->make_teacher();
-            next =
-                trained(pass, depth, walks, light, next.get(), (walks_ / kFirstPart) << round,
-                        hash_combine(seed, uint64_t(round)), has_roulette_ && round == kRounds - 1);
+            next = trained(pass, depth, walks, light, next.get(), (walks_ / kFirstPart) << round,
+                           hash_combine(seed, uint64_t(round)),
+                           has_roulette_ && round == kRounds - 1, selects_lights);
         }
     } else {
         Guide teacher = *guide_;
         teacher.make_teacher();
-        next = trained(pass, depth, walks, light, &teacher, walks_, seed, has_roulette_);
+        next = trained(pass, depth, walks, light, &teacher, walks_, seed, has_roulette_,
+                       selects_lights);
     }
     is_given_up_ = passes == 0 && mode_ == Mode::Auto && gains_little(*next, walks);
-    if (is_given_up_) next = nullptr;
-    if (next) {
+    if (is_given_up_) {
+        next = guide_of_lights(std::move(next->lights));
+    } else {
         next->has_roulette = has_roulette_;
         if (!given_) next->uses_surfaces = !gains_nothing(*next, walks);
     }
     guide_ = std::move(next);
     refits_ = refits;
-    seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
 std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOptions& depth,
                                         GuidedWalks guided, GuidedLight light, const Guide* teacher,
-                                        uint64_t walks, uint64_t seed, bool for_roulette) const {
+                                        uint64_t walks, uint64_t seed, bool for_roulette,
+                                        bool selects_lights) const {
     TechniqueCounts counts =
         for_roulette ? joins_of(guided, pass.light_paths) : joins_of(GuidedWalks::Both, 1);
     counts.guide = teacher;
@@ -478,7 +532,12 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
     if (!guide->surfaces.is_empty()) guide->surfaces.set_contributions(all.contributions);
     guide->light_contribution = float(all.light_contribution / double(walks));
     if (mode_ != Mode::Footprints) {
-        if (joins_of(guided, 1).next_event > 0) learn_lights(pass.scene, all.emission, *guide);
+        if (selects_lights) {
+            std::vector<Arrival> arrivals;
+            for (const EmissionRecord& r : all.emission)
+                arrivals.push_back({r.arrival, r.emitter->index});
+            guide->lights = learned_lights(pass.scene, std::move(arrivals));
+        }
         auto& seen = all.left_out[size_t(TransportMode::Importance)];
         learn_emission(pass.scene, all.emission, PlacedDensity(std::move(seen)),
                        learning_of_emission(guided), hash_combine(seed, 1), *guide);
@@ -511,18 +570,19 @@ std::vector<std::pair<std::string, double>> Guiding::figures() const {
 }
 
 void Guiding::add_figures(std::vector<std::pair<std::string, double>>& figures) const {
-    if (mode_ == Mode::Off) return;
-    figures.push_back({"guided", guide_ ? 1 : 0});
-    figures.push_back({"guide_seconds", seconds_});
-    if (!guide_) return;
+    if (is_on() || seconds_ > 0) {
+        figures.push_back({"guided", guides_walks() ? 1 : 0});
+        figures.push_back({"guide_seconds", seconds_});
+        figures.push_back({"guide_gain_lights", guide_ ? double(guide_->lights.gain()) : 0.0});
+    }
+    if (guide_) figures.push_back({"guide_bytes", double(guide_->memory_bytes())});
+    if (!guides_walks()) return;
     figures.push_back({"guided_surfaces", guide_->guides_surfaces() ? 1 : 0});
     figures.push_back({"guide_cells", double(guide_->surfaces.cells().size())});
     figures.push_back({"guide_gain_eye", double(guide_->surfaces.gain(TransportMode::Radiance))});
     figures.push_back(
         {"guide_gain_light", double(guide_->surfaces.gain(TransportMode::Importance))});
     figures.push_back({"guide_gain_emission", double(guide_->emission_gain)});
-    figures.push_back({"guide_gain_lights", double(guide_->lights.gain())});
-    figures.push_back({"guide_bytes", double(guide_->memory_bytes())});
 }
 
 }  // namespace etendue

@@ -66,7 +66,7 @@ std::string IntegratorSpec::to_string() const {
 }
 
 IntegratorParams::IntegratorParams(const IntegratorSpec& spec, const PluginInfo& info)
-    : integrator_(spec.name), guide_(spec.guide), specular_pilots_(spec.specular_pilots) {
+    : integrator_(spec.name), guide_(spec.guide), shared_by_pilots_(spec.shared_by_pilots) {
     std::vector<std::string> known;
     for (const ParamInfo& p : info.params) {
         values_[p.name] = p.fallback;

@@ -15,7 +15,7 @@
 
 namespace etendue {
 
-struct SpecularPilots;
+struct SharedByPilots;
 
 /// Statistical nature of an estimator; written into reports and images.
 enum class Estimator { Unbiased, Consistent, Biased };
@@ -94,7 +94,7 @@ struct IntegratorSpec {
     /// the pilots of `auto`.
     std::shared_ptr<const Guide> guide = nullptr;
     /// For the pilots of `auto`; otherwise empty.
-    std::shared_ptr<SpecularPilots> specular_pilots = nullptr;
+    std::shared_ptr<SharedByPilots> shared_by_pilots = nullptr;
 
     /// Throws std::runtime_error with one clear message.
     static IntegratorSpec parse(const std::string& text);
@@ -132,7 +132,7 @@ public:
     float number(const char* name, float low, float high) const;
     const std::string& integrator() const { return integrator_; }
     const std::shared_ptr<const Guide>& given_guide() const { return guide_; }
-    const std::shared_ptr<SpecularPilots>& specular_pilots() const { return specular_pilots_; }
+    const std::shared_ptr<SharedByPilots>& shared_by_pilots() const { return shared_by_pilots_; }
 
 private:
     [[noreturn]] void refuse_choice(const char* name, const std::vector<std::string>& known) const;
@@ -140,7 +140,7 @@ private:
     std::map<std::string, std::string> values_;
     std::string integrator_;
     std::shared_ptr<const Guide> guide_;
-    std::shared_ptr<SpecularPilots> specular_pilots_;
+    std::shared_ptr<SharedByPilots> shared_by_pilots_;
 };
 
 struct IntegratorEntry {

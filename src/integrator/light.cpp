@@ -18,7 +18,7 @@ public:
     void save(LearnedState& to) const override { guiding_.save(to); }
     void load(LearnedState& from) override { guiding_.load(from); }
     void prepare(const PassContext& pass) override {
-        guiding_.train(pass, depth_, GuidedWalks::Light);
+        guiding_.train(pass, counts(pass.scene, pass.light_paths), depth_, GuidedWalks::Light);
     }
 
     void sample(const SampleContext& c, Workspace& work) const override {

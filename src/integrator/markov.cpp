@@ -58,7 +58,7 @@ uint64_t MarkovIntegrator::whole_film_paths(const Scene& scene) {
 TechniqueCounts MarkovIntegrator::guided_counts(const Scene& scene) const {
     // Of bidirectional path tracing alone; the counts of derived classes may depend on an earlier begin().
     TechniqueCounts n = MarkovIntegrator::counts(scene, 0);
-    n.guide = guiding_.guide();
+    if (guiding_.guides_walks()) n.guide = guiding_.guide();
     return n;
 }
 
@@ -96,14 +96,15 @@ void MarkovIntegrator::trace(const PassContext& pass) {
     const bool is_loaded = !loaded_.empty();
     if (!has_begun_) {
         if (!is_loaded) {
-            guiding_.train(pass, pilot_paths_.depth(), GuidedWalks::Both, GuidedLight::Indirect);
+            guiding_.train(pass, MarkovIntegrator::counts(pass.scene, 0), pilot_paths_.depth(),
+                           GuidedWalks::Both, GuidedLight::Indirect);
             set_direct_guide();
             const TechniqueCounts n = guided_direct_counts(pass.scene, pass.light_paths);
             pilot_ = run_pilot(pass, bidirectional_sample(pilot_paths_, guided_counts(pass.scene)),
                                [&](int, const SampleContext& c, Workspace& work) {
                                    add_bdpt_sample(direct_, c, n, work);
                                });
-            if (guiding_.guide() && !guides_large_steps()) {
+            if (guiding_.guides_walks() && !guides_large_steps()) {
                 const TechniqueCounts unguided = MarkovIntegrator::counts(pass.scene, 0);
                 pilot_->by_unguided_technique =
                     unguided_light(pass, bidirectional_sample(pilot_paths_, unguided), *pilot_);

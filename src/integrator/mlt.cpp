@@ -78,6 +78,7 @@ IntegratorEntry mlt_entry() {
                       {"user_ratio", ParamKind::Float, "1",
                        "Number of proposals near user paths for each bidirectional mutation, and "
                        "of large steps that follow them for each other one, 0.01 to 100."}},
+                     Guiding::lights_params(),
                      Guiding::params(GuideRefits::Never)})},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<MltIntegrator>(p);

@@ -188,6 +188,7 @@ IntegratorEntry mmlt_entry() {
                      {{"lengths", ParamKind::Int, "10",
                        "Number of classes of path lengths, 1 to 64, from three edges on; each has "
                        "its own chains. The last class contains all longer paths."}},
+                     Guiding::lights_params(),
                      Guiding::params(GuideRefits::Never)})},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<MmltIntegrator>(p);

@@ -28,7 +28,7 @@ public:
         specular_.load(from);
     }
     void prepare(const PassContext& pass) override {
-        guiding_.train(pass, depth_, GuidedWalks::Eye);
+        guiding_.train(pass, counts(pass.scene, 0), depth_, GuidedWalks::Eye);
         specular_.prepare(pass, depth_, counts(pass.scene, 0));
     }
 
@@ -66,7 +66,7 @@ public:
         return figures;
     }
     bool samples_alone(const Scene& scene) const override {
-        return !guiding_.is_on() && !specular_.is_prepared_for(scene);
+        return !guiding_.is_prepared_for(scene) && !specular_.is_prepared_for(scene);
     }
     Estimator estimator() const override { return Estimator::Unbiased; }
 
@@ -91,6 +91,7 @@ IntegratorEntry path_entry() {
                 "Specular connections of small contributions are searched for at random, and the "
                 "others weighted up. Threshold, in [0, 1], as a fraction of the pixel's luminance "
                 "in earlier passes; 0 searches for all."}},
+              Guiding::lights_params(),
               Guiding::params()})},
         [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
             return std::make_unique<PathIntegrator>(p);

@@ -50,7 +50,7 @@ public:
     void save(LearnedState& to) const override { paths_.save(to); }
     void load(LearnedState& from) override { paths_.load(from); }
     void prepare(const PassContext& pass) override {
-        paths_.train(pass);
+        paths_.train(pass, counts(pass.scene, pass.light_paths));
         paths_.prepare_specular(pass, counts(pass.scene, pass.light_paths));
     }
     void trace(const PassContext& pass) override {
@@ -287,6 +287,7 @@ std::vector<ParamInfo> pcbpt_params() {
           {"uniform", ParamKind::Float, "0.5",
            "Fraction of connections that are drawn uniformly, in [0.001, 1]."}},
          Specular::params(),
+         Guiding::lights_params(),
          Guiding::params(),
          {{"weights", ParamKind::String, "upper",
            "Count of a connection in the weights: upper (1, since all pixels share the light "

@@ -33,7 +33,7 @@ IntegratorEntry pssmlt_entry() {
     return {{"integrator", "pssmlt",
              "Metropolis light transport in the primary sample space of bidirectional path "
              "tracing. Unbiased.",
-             concat({sub_path_params(), MarkovIntegrator::params(),
+             concat({sub_path_params(), MarkovIntegrator::params(), Guiding::lights_params(),
                      Guiding::params(GuideRefits::Never)})},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<PssmltIntegrator>(p);

@@ -1,6 +1,7 @@
 #include "integrator/specular.h"
 
 #include "integrator/seed_photon_walks.h"
+#include "integrator/shared_by_pilots.h"
 
 namespace etendue {
 
@@ -21,7 +22,7 @@ Specular::Specular(const IntegratorParams& p) {
     is_used_ = mode_ != Mode::Off;
     depth_ = p.integer("specular_depth", 1, ChainEvents::kMost);
     method_ = p.integrator();
-    pilots_ = p.specular_pilots();
+    pilots_ = p.shared_by_pilots();
 }
 
 void Specular::prepare(const PassContext& pass, const DepthOptions& depth, TechniqueCounts counts) {
@@ -34,13 +35,13 @@ void Specular::prepare(const PassContext& pass, const DepthOptions& depth, Techn
         return std::make_shared<const SeedPhotons>(trace_seed_photons(pass, depth_, walks));
     };
     const bool is_pilot = pilots_ != nullptr;
-    SpecularPilots own;
-    SpecularPilots& pilots = is_pilot ? *pilots_ : own;
+    SharedByPilots own;
+    SharedByPilots& pilots = is_pilot ? *pilots_ : own;
     if (!pilots.photons) pilots.photons = photons(kWalksOfPilot);
-    auto known = pilots.by_method.find(method_);
-    if (known == pilots.by_method.end()) {
+    auto known = pilots.specular.find(method_);
+    if (known == pilots.specular.end()) {
         counts.specular_depth = depth_;
-        known = pilots.by_method
+        known = pilots.specular
                     .emplace(method_, run_specular_pilot(pass, depth, counts, *pilots.photons))
                     .first;
     }

@@ -1,19 +1,12 @@
 #pragma once
 
-#include <map>
 #include <memory>
+#include <string>
 
 #include "integrator/integrator.h"
-#include "integrator/specular_pilot.h"
 #include "manifold/specular_connection.h"
 
 namespace etendue {
-
-/// What the pilots of `auto` prepare once for all of them. Not for two renderings at a time.
-struct SpecularPilots {
-    std::shared_ptr<const SeedPhotons> photons;
-    std::map<std::string, SpecularPilot> by_method;
-};
 
 /// Specular connections as an option of integrators.
 class Specular {
@@ -70,7 +63,7 @@ private:
     float luminance_ = 0;  ///< Mean of the image in the pilot.
     std::shared_ptr<const SeedPhotons> photons_;
     std::string method_;
-    std::shared_ptr<SpecularPilots> pilots_;  ///< Null in renderings that are no pilots.
+    std::shared_ptr<SharedByPilots> pilots_;  ///< Null in renderings that are no pilots.
 };
 
 }  // namespace etendue

@@ -80,7 +80,7 @@ public:
     }
 
     void prepare(const PassContext& pass) override {
-        paths_.train(pass, GuidedWalks::BothWithPairs);
+        paths_.train(pass, counts(pass.scene, pass.light_paths), GuidedWalks::BothWithPairs);
         paths_.prepare_specular(pass, counts(pass.scene, pass.light_paths));
         if (pass.film.passes() == 0) start(pass);
     }
@@ -313,7 +313,7 @@ IntegratorEntry upg_entry() {
 IntegratorEntry upg_bdpt_entry() {
     return {{"integrator", "upg+bdpt",
              "Unbiased photon gathering with bidirectional path tracing. Unbiased.",
-             upg_params(Specular::params())},
+             upg_params(concat({Specular::params(), Guiding::lights_params()}))},
             [](const IntegratorParams& p) -> std::unique_ptr<Integrator> {
                 return std::make_unique<UpgIntegrator>(p, true);
             }};

@@ -69,7 +69,9 @@ public:
         gathers_.add(workers);
     }
 
-    void prepare(const PassContext& pass) override { paths_.train(pass); }
+    void prepare(const PassContext& pass) override {
+        paths_.train(pass, counts(pass.scene, pass.light_paths));
+    }
     void trace(const PassContext& pass) override {
         radius_ = radius_params_.radius(pass.scene, pass.index);
         cache_.begin(pass.chunks(pass.light_paths), kVertexBytes, light_.memory,
@@ -228,6 +230,7 @@ std::vector<ParamInfo> vcm_params() {
            "is not a mirror or clear glass. Merges at this vertex make most of the image, so the "
            "rest of the path is worth less than its cost. The MIS weights know this probability. "
            "Has no effect with exact=true or merges=false."}},
+         Guiding::lights_params(),
          Guiding::params(),
          {{"connections", ParamKind::Bool, "true",
            "Whether sub-paths are connected to each other, to emitters and to the lens.", true},

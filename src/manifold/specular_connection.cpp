@@ -16,8 +16,8 @@ double density_ratio(const LampPoint& lamp, const ChainRay& ray, double jacobian
     return kSolutionShare * spread(jacobian, length) * lamp.pdf / (pdf * jacobian * cosine);
 }
 
-/// x_0 of a path whose light leaves along `w`.
-LampPoint lamp_point(const Vertex& x0, const Emitter& emitter, Vec3 w) {
+/// x_0 of a path whose light leaves along `w`; the chain's eye vertex selects its emitter with the probability `pmf`.
+LampPoint lamp_point(const Vertex& x0, const Emitter& emitter, float pmf, Vec3 w) {
     const EmitterHit e = x0.is_infinite ? emitter.eval_infinite(x0.p)
                                         : emitter.eval_surface(x0.ng, x0.uv, x0.location.prim, w);
     return {.emitter = &emitter,
@@ -25,20 +25,20 @@ LampPoint lamp_point(const Vertex& x0, const Emitter& emitter, Vec3 w) {
             .ng = x0.ng,
             .uv = x0.uv,
             .prim = x0.location.prim,
-            .pdf = double(emitter.selection_pmf) * double(e.pdf_y0)};
+            .pdf = double(pmf) * double(e.pdf_y0)};
 }
 
-/// Draws y_0; its density is 0 where it has none.
-LampPoint draw_lamp_point(const Scene& scene, Sampler& sampler) {
+/// Draws y_0, on an emitter that next events at `from` would select; its density is 0 where it has none.
+LampPoint draw_lamp_point(const Scene& scene, const Vertex& from, Sampler& sampler) {
     const Emitter& emitter =
-        scene.sample_emitter(sampler.next_1d_fine_if(scene.has_emitter_choice()));
+        select_emitter(scene, from, sampler.next_1d_fine_if(scene.has_emitter_choice()));
     const EmissionSample e = emitter.sample_emission(sampler.next_2d_fine(), {0.5f, 0.5f});
     return {.emitter = &emitter,
             .p = emitter.is_infinite() ? -e.d : e.p,
             .ng = e.ng,
             .uv = e.uv,
             .prim = e.prim,
-            .pdf = double(emitter.selection_pmf) * double(e.pdf_y0)};
+            .pdf = double(next_event_pmf(from, emitter)) * double(e.pdf_y0)};
 }
 
 /// A chain between z_{t-1} and y_0, with what the path contributes along it, without the number of trials.
@@ -137,7 +137,7 @@ std::optional<Join> join_specular(const Scene& scene, const SubPath& z, int t,
     if (!is_left_to_hits(z, t, counts)) return {};
 
     sampler.seek(Stream::Auxiliary, uint64_t(t));
-    const LampPoint lamp = draw_lamp_point(scene, sampler);
+    const LampPoint lamp = draw_lamp_point(scene, from, sampler);
     if (!(lamp.pdf > 0)) return {};
     ChainTracer tracer(scene, from, work.stats);
     static const SeedPhotons kNone;
@@ -197,7 +197,7 @@ float hit_beside_specular(const Scene& scene, const SubPath& z, int t, const Emi
     KnownChain chain(scene, z[from].p, Vec3d(-z[from + 1].wo));
     for (int i = from + 1; i < last; ++i)
         if (!chain.pass(z[i], z[i].wo)) return 1;
-    const LampPoint lamp = lamp_point(end, emitter, end.wo);
+    const LampPoint lamp = lamp_point(end, emitter, next_event_pmf(z[from], emitter), end.wo);
     const Vertex& first = z[from + 1];
     const double pdf = double(first.pdf_fwd) * double(length2(first.p - z[from].p)) /
                        double(abs_dot(first.ng, first.wo));
@@ -222,7 +222,8 @@ float hit_lens_beside_specular(const Scene& scene, const SubPath& y, int s,
     for (int i = from - 1; i > 0; --i)
         if (!chain.pass(y[i], -y[i + 1].wo)) return 1;
     if (y0.emitter->is_delta()) return 0;
-    const LampPoint lamp = lamp_point(y0, *y0.emitter, -y[1].wo);
+    const LampPoint lamp =
+        lamp_point(y0, *y0.emitter, next_event_pmf(y[from], *y0.emitter, counts.guide), -y[1].wo);
     return rest_beside(lamp, chain.ray(),
                        double(y[from - 1].pdf_rev) / double(y[from].to_predecessor));
 }

@@ -83,15 +83,16 @@ EmitterChoice choose_emitter(const Scene& scene, const SubPath& z, int last, Sam
     sampler.seek(Stream::Connection, uint32_t(last));
     const double u = rotated(sampler.next_1d_fine_if(scene.has_emitter_choice()), draw);
     const FinePoint of_point = rotated(sampler.next_2d_fine(), draw);
-    const LightSelection* learned = z[last].lights;
-    if (!learned) return {&scene.sample_emitter(u), of_point};
-    const LightSelection::Draw selected = learned->sample(u);
-    return {selected.emitter ? &scene.emitter(*selected.emitter)
-                             : &scene.sample_emitter(selected.u),
-            of_point};
+    return {&select_emitter(scene, z[last], u), of_point};
 }
 
 }  // namespace
+
+const Emitter& select_emitter(const Scene& scene, const Vertex& v, double u) {
+    if (!v.lights) return scene.sample_emitter(u);
+    const LightSelection::Draw selected = v.lights->sample(u);
+    return selected.emitter ? scene.emitter(*selected.emitter) : scene.sample_emitter(selected.u);
+}
 
 void prefetch_next_events(const Scene& scene, std::span<const WalkInTurn> walks) {
     if (!scene.has_large_emitter_tables() || !scene.has_emitters()) return;

@@ -60,6 +60,8 @@ float visibility(const Scene& scene, const Join& join, RenderStats& stats);
 /// C(0,t): z_{t-1} lies on `emitter`.
 std::optional<Join> join_hit(const SubPath& z, int t, const Emitter& emitter,
                              const TechniqueCounts& counts);
+/// The emitter that next events at `v` select by the number `u`, with the probability next_event_pmf().
+const Emitter& select_emitter(const Scene& scene, const Vertex& v, double u);
 /// C(1,t): a point on an emitter sampled for z_{t-1}. The points with the numbers `draw` = 0, 1, 2 … are stratified, and
 /// each of them alone has the density of the technique.
 std::optional<Join> join_next_event(const Scene& scene, const SubPath& z, int t, Sampler& sampler,

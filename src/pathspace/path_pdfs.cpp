@@ -126,10 +126,8 @@ PathValue evaluate_path(const Scene& scene, std::span<const Vertex* const> x,
     p.can_hit_emitter = !emitter.is_delta();
     p.can_connect_ends = p.can_hit_emitter && !(x[0]->is_infinite && x[k]->is_infinite);
     p.light[0] = emission_pmf(guide, emitter);
-    p.next_event = emitter.selection_pmf;
-    if (guide && x[1]->kind == Vertex::Kind::Surface)
-        if (const LightSelection* lights = guide->lights_at(x[1]->p, side_normal(*x[1])))
-            p.next_event = lights->pmf(emitter.index, emitter.selection_pmf);
+    p.next_event = x[1]->kind == Vertex::Kind::Surface ? next_event_pmf(*x[1], emitter, guide)
+                                                       : emitter.selection_pmf;
     if (p.can_hit_emitter) {
         p.light[0] *= origin_pdf(guide, emitter, x[0]->p, hit.pdf_y0);
         p.next_event *= emitter.is_infinite()

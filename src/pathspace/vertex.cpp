@@ -113,6 +113,11 @@ float learned_selection_pmf(const LightSelection& lights, const Emitter& emitter
     return lights.pmf(emitter.index, emitter.selection_pmf);
 }
 
+float next_event_pmf(const Vertex& v, const Emitter& emitter, const Guide* guide) {
+    const LightSelection* lights = guide ? guide->lights_at(v.p, side_normal(v)) : nullptr;
+    return lights ? learned_selection_pmf(*lights, emitter) : emitter.selection_pmf;
+}
+
 float guided_emission_pmf(const Guide& guide, const Emitter& emitter) {
     return guide.chooses_emitters() ? guide.emission_pmf(emitter.index) : emitter.selection_pmf;
 }

@@ -206,6 +206,8 @@ float learned_selection_pmf(const LightSelection& lights, const Emitter& emitter
 inline float next_event_pmf(const Vertex& v, const Emitter& emitter) {
     return v.lights ? learned_selection_pmf(*v.lights, emitter) : emitter.selection_pmf;
 }
+/// The same for next events with a guide, at any surface vertex: those of light walks keep no selection.
+float next_event_pmf(const Vertex& v, const Emitter& emitter, const Guide* guide);
 /// p_NE(y_0): density with which next events at `v` sample y_0 = `y0` of an emitter, the selection included. `hit` is what is
 /// known of y_0.
 inline double next_event_pdf(const Vertex& v, const Vertex& y0, const Emitter& emitter,

@@ -74,7 +74,8 @@ Guiding train(const Scene& scene, IntegratorSpec& spec, uint64_t seed, int threa
                        .chunks = {},
                        .for_each_other_path = for_each,
                        .for_each_chain = {}},
-                      depth, walks, light);
+                      integrator->counts(scene, integrator->light_paths(scene)), depth, walks,
+                      light);
     });
     const Guide* guide = guiding.guide();
     if (!guide || (guide->surfaces.is_empty() && guide->lights.is_empty()))
@@ -154,12 +155,6 @@ LearnedGuide::LearnedGuide(const Scene& scene, IntegratorSpec spec, uint64_t see
 
 bool LearnedGuide::is_kept_by_auto() const {
     return !Guiding::gains_little(guide(), guided_walks(method_));
-}
-
-Guide LearnedGuide::guide_of_auto() const {
-    Guide used = guide();
-    used.uses_surfaces = Guiding::guides_surfaces_by_auto(used, guided_walks(method_));
-    return used;
 }
 
 template <class Pmf>

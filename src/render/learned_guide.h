@@ -65,8 +65,6 @@ public:
     const std::string& method() const { return method_; }
     /// Whether guide=auto would keep the guide of the method.
     bool is_kept_by_auto() const;
-    /// The guide as guide=auto uses it, if it keeps it.
-    Guide guide_of_auto() const;
 
     /// The emitters that light paths choose most often: at most so many, the most frequent one first; empty where light paths
     /// choose by power.

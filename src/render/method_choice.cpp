@@ -12,7 +12,7 @@
 
 #include "description/json_text.h"
 #include "integrator/auto.h"
-#include "integrator/specular.h"
+#include "integrator/shared_by_pilots.h"
 #include "render/candidates.h"
 #include "render/cost_table.h"
 #include "render/learned_guide.h"
@@ -316,7 +316,7 @@ private:
         RenderSettings settings = settings_;
         settings.integrator = spec_of(c.in_pilots);
         settings.integrator.guide = c.guide;
-        settings.integrator.specular_pilots = specular_pilots_;
+        settings.integrator.shared_by_pilots = shared_by_pilots_;
         const MethodPilot pilot = render_pilot(small, settings, number_, most, drop_);
         number_ += kPilotReplicates;
         budget_.spend(pilot.all_seconds);
@@ -419,8 +419,8 @@ private:
     }
     /// Whether the method has decided for specular connections.
     bool is_specular(const Contender& c) const {
-        const auto pilot = specular_pilots_->by_method.find(c.name());
-        return pilot != specular_pilots_->by_method.end() && pilot->second.is_worthwhile();
+        const auto pilot = shared_by_pilots_->specular.find(c.name());
+        return pilot != shared_by_pilots_->specular.end() && pilot->second.is_worthwhile();
     }
 
     void drop_hopeless() {
@@ -475,8 +475,7 @@ private:
                                        pilot_seed(settings_.seed, PilotUse::Choice, number_++),
                                        settings_.threads);
             if (drop_.load()) throw PassDropped();
-            if (learned.is_kept_by_auto())
-                return std::make_shared<const Guide>(learned.guide_of_auto());
+            if (learned.is_kept_by_auto()) return std::make_shared<const Guide>(learned.guide());
         } catch (const NothingToLearn&) {
         }
         return nullptr;
@@ -494,7 +493,7 @@ private:
     double pixels_before_ = 0;  ///< Of the film of the last pilots.
     uint64_t number_ = 0;       ///< Of the next pilot.
     bool has_tried_guides_ = false;
-    const std::shared_ptr<SpecularPilots> specular_pilots_ = std::make_shared<SpecularPilots>();
+    const std::shared_ptr<SharedByPilots> shared_by_pilots_ = std::make_shared<SharedByPilots>();
 };
 
 }  // namespace

@@ -12,6 +12,7 @@ enum class PilotUse : uint64_t {
     LightPathCount = 0x636f756e74,  ///< LightPathOptions::count()
     Pairs = 0x7061697273,           ///< run_pair_pilot()
     Guide = 0x67756964,             ///< Guiding::train(), plus the index of the pass.
+    Lights = 0x6c69676874,          ///< The selection of emitters alone, in Guiding::train().
     Chains = 0x70696c6f74,          ///< run_pilot()
     Choice = 0x63686f696365,        ///< with_chosen_method(), plus the index of the pilot.
     PhotonScale = 0x6d7073,         ///< The scale of the importance of photons.

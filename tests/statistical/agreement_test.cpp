@@ -255,6 +255,33 @@ TEST(GatherChoices, AgreeWithPathTracing) {
             path, 0.08, choice);
 }
 
+/// Eight lamps near the walls, each of which lights its surroundings.
+std::string room_of_lamps() {
+    std::string scene = front_camera(kAgreementSize) + room();
+    for (const char* x : {"-0.8", "0.8"})
+        for (const char* y : {"-0.8", "0.8"})
+            for (const char* z : {"-0.8", "0.5"})
+                scene += sphere(fmt::format("{},{},{}", x, y, z), "0.08",
+                                "<emitter type=\"area\"><rgb name=\"radiance\" "
+                                "value=\"12,10,8\"/></emitter>");
+    return scene;
+}
+
+TEST(LearnedLights, AgreeWithTheSelectionByPower) {
+    const Scene scene = build(room_of_lamps());
+    EXPECT_FALSE(
+        LearnedGuide(scene, IntegratorSpec::parse("path"), 1, 2).guide().lights.is_empty());
+    const auto tiles = [&](const std::string& method, uint64_t passes, uint64_t seed) {
+        return render_tiles(scene, method, {.passes = passes, .seed = seed, .shortest = 2});
+    };
+    const Tiles path = tiles("path:lights=power", 512, 1);
+    uint64_t seed = 2;
+    for (const char* method :
+         {"path", "bdpt", "upg+bdpt:radius=0.12", "pcbpt:record_fraction=0.02", "vcm:merges=false"})
+        expect_same_image(tiles(method, 192, seed++), path, 0.05, method);
+    expect_same_image(tiles("mmlt:chains=48,groups=256", 256, seed), path, 0.08, "mmlt");
+}
+
 /// Specular connections, on scenes whose lamps hits find often enough.
 class SpecularAgreement : public ::testing::TestWithParam<AgreementCase> {};
 

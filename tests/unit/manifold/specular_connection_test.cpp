@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "pathspace/path_pdfs.h"
+#include "random_guide.h"
 #include "test_scenes.h"
 
 namespace etendue {
@@ -47,6 +48,13 @@ std::vector<SpecularCase> weight_cases() {
     };
 }
 
+/// Next events select emitters as it wants; walks are not guided.
+Guide guide_of_lights(const Scene& scene) {
+    Guide guide;
+    guide.lights = test::random_guide(scene, 5, 3).lights;
+    return guide;
+}
+
 /// Solid angle of directions at `from` over the area normal to the rays at the lamp, from differences.
 double jacobian_of_differences(const Scene& scene, const Vertex& from, Vec3d w,
                                const ChainEvents& events, const LampPoint& lamp) {
@@ -77,7 +85,8 @@ TEST_P(SpecularWeights, AreThoseOfTheDefinition) {
     const auto& [test_case, beside_it] = GetParam();
     const bool has_connections = beside_it != Beside::Nothing;
     const Scene scene = test::build(test_case.xml);
-    TechniqueCounts counts{.hit = 1, .next_event = 1, .specular_depth = 4};
+    const Guide guide = guide_of_lights(scene);
+    TechniqueCounts counts{.hit = 1, .next_event = 1, .guide = &guide, .specular_depth = 4};
     if (has_connections) counts.connect = 1, counts.splat = kPixels * kPixels;
     if (beside_it == Beside::Gathers) {
         counts.gather = kPixels * kPixels;
@@ -132,7 +141,7 @@ TEST_P(SpecularWeights, AreThoseOfTheDefinition) {
                 std::vector<bool> delta;
                 for (const Vertex* v : vertices) delta.push_back(v->is_delta);
                 delta.front() = false;
-                PathPdfs pdfs = evaluate_path(scene, vertices, delta).pdfs;
+                PathPdfs pdfs = evaluate_path(scene, vertices, delta, &guide).pdfs;
                 const EmitterHit e =
                     x0.is_infinite
                         ? x->emitter->eval_infinite(x0.p)
@@ -150,8 +159,8 @@ TEST_P(SpecularWeights, AreThoseOfTheDefinition) {
                     way = 0;
                     for (int i = t; i < z.size(); ++i) way += double(length(z[i].p - z[i - 1].p));
                 }
-                pdfs.specular_ratio = kSolutionShare * spread(J, way) *
-                                      double(x->emitter->selection_pmf) * double(e.pdf_y0) /
+                const double pmf = double(next_event_pmf(z[t - 1], *x->emitter, &guide));
+                pdfs.specular_ratio = kSolutionShare * spread(J, way) * pmf * double(e.pdf_y0) /
                                       (double(f.pdf) * J * cosine);
                 const double of_x = mis_weight(pdfs, x->technique, counts),
                              of_hit = mis_weight(pdfs, {Strategy::Hit, 0, z.size()}, counts);
@@ -210,6 +219,86 @@ TEST(SpecularTrials, DoNotDependOnRoulette) {
     EXPECT_EQ(std::accumulate(by_trials.begin(), by_trials.end(), uint64_t(0)), work.stats.chains);
     EXPECT_LE(work.stats.chains + work.stats.chain_failures,
               work.stats.chain_seeds - work.stats.chain_trials);
+}
+
+/// A lamp below water, and a weaker one that is selected far more often by what is learned.
+std::string pool_with_lamps(const std::string& shape) {
+    const auto lamp = [&](const char* x, const char* radiance) {
+        return test::sphere(std::string(x) + ",-0.8,0", "0.1",
+                            std::string("<emitter type=\"area\"><rgb name=\"radiance\" value=\"") +
+                                radiance + "\"/></emitter>");
+    };
+    return shape + test::room() + lamp("-0.5", "9,9,9") + lamp("0.5", "1,1,1") +
+           test::rectangle("<rotate x=\"1\" angle=\"-90\"/><translate y=\"-0.5\"/>", test::kGlass);
+}
+
+/// Emitters that are drawn with other probabilities contribute as much in the mean.
+TEST(SpecularConnections, AreUnbiasedWithAnySelectionOfLamps) {
+    const Scene scene = test::build(pool_with_lamps(test::front_camera(kPixels)));
+    const Guide guide = guide_of_lights(scene);
+    const Film film(scene.film(), scene.filter());
+    Workspace work;
+    Sampler sampler(SamplerKind::Independent, 5);
+    constexpr uint64_t kWalks = 200 * kPixels * kPixels;
+    std::array<double, 2> mean{}, error{};
+    for (const size_t k : {0, 1}) {
+        // Without weights of hits: connections make all of the light.
+        const TechniqueCounts counts{
+            .next_event = 1, .guide = k == 1 ? &guide : nullptr, .specular_depth = 4};
+        const WalkContext walk{scene, counts, work.stats, {4, 10}};
+        double sum = 0, squares = 0;
+        for (uint64_t i = 0; i < kWalks; ++i) {
+            sampler.start(uint32_t(k), i);
+            trace_eye_path(walk, film, i % (kPixels * kPixels), sampler, work.z);
+            double value = 0;
+            if (work.z.size() > 1)
+                if (const auto x = join_specular(scene, work.z, 2, {20}, sampler, counts, work))
+                    value = std::fmin(double(luminance(x->contribution)), 100.0);
+            sum += value, squares += value * value;
+        }
+        mean[k] = sum / kWalks;
+        error[k] = std::sqrt((squares / kWalks - sqr(mean[k])) / kWalks);
+    }
+    EXPECT_GT(mean[0], 10 * error[0]);
+    EXPECT_NEAR(mean[0], mean[1], 4 * std::hypot(error[0], error[1]));
+}
+
+/// w / (1 - w) of a weight w of connections beside hits is in proportion to the square of the density of y_0.
+TEST(SpecularWeightsOfLensHits, KnowTheSelectionOfTheEyeVertex) {
+    const Scene scene = test::build(pool_with_lamps(test::lens_camera(kPixels)));
+    const Guide guide = guide_of_lights(scene);
+    TechniqueCounts counts{.hit = 1,
+                           .next_event = 1,
+                           .connect = 1,
+                           .splat = kPixels * kPixels,
+                           .hit_lens = kPixels * kPixels,
+                           .specular_depth = 4};
+    Workspace work;
+    const WalkContext walk{scene, counts, work.stats, {6, 10}};
+    Sampler sampler(SamplerKind::Independent, 5);
+    int compared = 0;
+    for (uint64_t i = 0; i < 4000; ++i) {
+        sampler.start(0, i);
+        trace_light_path(walk, sampler, work.y);
+        for (int s = 2; s < work.y.size(); ++s) {
+            const auto ratio = [&](const Guide* by) {
+                counts.guide = by;
+                const double rest = double(hit_lens_beside_specular(scene, work.y, s + 1, counts));
+                return std::sqrt((1 - rest) / rest);
+            };
+            const double by_power = ratio(nullptr), learned = ratio(&guide);
+            if (!(by_power > 0.05 && by_power < 20 && learned > 0.05 && learned < 20)) continue;
+            int from = 1;
+            while (work.y[from].is_delta) ++from;
+            const Emitter& emitter = *work.y[0].emitter;
+            EXPECT_NEAR(learned / by_power,
+                        double(next_event_pmf(work.y[from], emitter, &guide)) /
+                            double(emitter.selection_pmf),
+                        0.02 * learned / by_power);
+            ++compared;
+        }
+    }
+    EXPECT_GT(compared, 50);
 }
 
 /// Light of a point that no specular connection can make is all left to hits of the lens.

@@ -123,6 +123,109 @@ TEST(LearnedLights, AreLearnedAgain) {
     EXPECT_NE(gain_after(1), gain_after(17));
 }
 
+std::map<std::string, double> figures_after(const Scene& scene, const std::string& integrator) {
+    RenderSettings settings;
+    settings.integrator = IntegratorSpec::parse(integrator);
+    settings.threads = 2;
+    settings.spp = 1;
+    Renderer r(scene, settings);
+    r.run([](const Progress&) {}, std::atomic<bool>{false});
+    std::map<std::string, double> figures;
+    for (const auto& [name, value] : r.integrator().figures()) figures[name] = value;
+    return figures;
+}
+
+TEST(LearnedLights, NeedNoGuidedWalks) {
+    const Scene scene = test::build(floor_under_spots());
+    for (const std::string method :
+         {"path", "bdpt", "vcm", "upg+bdpt", "pcbpt", "path:guide=auto", "bdpt:guide=auto"}) {
+        const auto figures = figures_after(scene, method);
+        ASSERT_TRUE(figures.count("guide_gain_lights")) << method;
+        EXPECT_GT(figures.at("guide_gain_lights"), 1) << method;
+        EXPECT_EQ(figures.at("guided"), 0) << method;
+        const std::string by_power =
+            method + (method.find(':') == std::string::npos ? ":" : ",") + "lights=power";
+        const auto without = figures_after(scene, by_power);
+        EXPECT_TRUE(!without.count("guide_gain_lights") || without.at("guide_gain_lights") == 0)
+            << by_power;
+    }
+    for (const char* method :
+         {"pcbpt:direct=stored", "vcm:connections=false", "bdpt:guide=on,lights=power"}) {
+        const auto figures = figures_after(scene, method);
+        EXPECT_TRUE(!figures.count("guide_gain_lights") || figures.at("guide_gain_lights") == 0)
+            << method;
+    }
+    for (const char* method : {"light:lights=power", "upg:lights=power"})
+        EXPECT_THROW(figures_after(scene, method), std::runtime_error) << method;
+}
+
+std::vector<Rgb> image_of(const Scene& scene, const std::string& integrator, int threads) {
+    RenderSettings settings;
+    settings.integrator = IntegratorSpec::parse(integrator);
+    settings.threads = threads;
+    settings.spp = 2;
+    Renderer r(scene, settings);
+    r.run([](const Progress&) {}, std::atomic<bool>{false});
+    return r.film().image();
+}
+
+bool is_same(const std::vector<Rgb>& a, const std::vector<Rgb>& b) {
+    for (size_t i = 0; i < a.size(); ++i)
+        for (int c = 0; c < 3; ++c)
+            if (a[i][c] != b[i][c]) return false;
+    return a.size() == b.size();
+}
+
+TEST(LearnedLights, DoNotDependOnThreads) {
+    const Scene scene = test::build(floor_under_spots());
+    for (const char* method : {"path", "bdpt"}) {
+        EXPECT_TRUE(is_same(image_of(scene, method, 1), image_of(scene, method, 3))) << method;
+        EXPECT_FALSE(is_same(image_of(scene, method, 1),
+                             image_of(scene, std::string(method) + ":lights=power", 1)))
+            << method;
+    }
+}
+
+/// One emitter, and two whose light arrives everywhere alike.
+TEST(LearnedLights, ChangeNothingWhereNothingIsGained) {
+    const std::string room = test::front_camera(kSize) + test::room() + test::area_lamp();
+    const Scene one = test::build(room);
+    for (const char* method : {"path", "bdpt"}) {
+        const std::string by_power = std::string(method) + ":lights=power";
+        EXPECT_FALSE(figures_after(one, method).count("guide_gain_lights")) << method;
+        EXPECT_TRUE(is_same(image_of(one, method, 1), image_of(one, by_power, 1))) << method;
+    }
+    const std::string above = "<emitter type=\"point\"><point name=\"position\" "
+                              "value=\"0,0.5,0\"/></emitter>";
+    const Scene two = test::build(test::front_camera(kSize) + test::room() + above + above);
+    EXPECT_EQ(figures_after(two, "path").at("guide_gain_lights"), 0);
+    EXPECT_TRUE(is_same(image_of(two, "path", 1), image_of(two, "path:lights=power", 1)));
+}
+
+TEST(LearnedLights, AreKeptWithAllThatIsLearned) {
+    const Scene scene = test::build(floor_under_spots());
+    RenderSettings settings;
+    settings.spp = 1;
+    for (const char* method : {"path", "bdpt", "vcm", "upg+bdpt", "pcbpt"}) {
+        settings.integrator = IntegratorSpec::parse(method);
+        Renderer r(scene, settings);
+        r.run([](const Progress&) {}, std::atomic<bool>{false});
+        LearnedState saved;
+        r.integrator().save(saved);
+        LearnedState read(saved.bytes());
+        const auto again = make_integrator(settings.integrator);
+        again->load(read);
+        const uint64_t light_paths = again->light_paths(scene);
+        const Guide *before = r.integrator().counts(scene, light_paths).guide,
+                    *after = again->counts(scene, light_paths).guide;
+        ASSERT_TRUE(before && after) << method;
+        EXPECT_EQ(after->lights.gain(), before->lights.gain());
+        for (const auto& e : scene.emitters())
+            EXPECT_EQ(after->lights_at({}, {0, 1, 0})->pmf(e->index, 0.1f),
+                      before->lights_at({}, {0, 1, 0})->pmf(e->index, 0.1f));
+    }
+}
+
 /// Light walks learn the way to what the lens sees, not to the pane before it.
 TEST(LearnedImportance, LeavesOutTheWayToTheLens) {
     const Scene scene = test::build(test::front_camera(kSize) + pane() + test::room() +

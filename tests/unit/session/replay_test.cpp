@@ -210,6 +210,13 @@ TEST(Replay, KnowsWhichPassesCanBeTraced) {
         EXPECT_EQ(passes(shared, rough), ReplayedPasses::Whole) << shared;
     for (const char* none : {"mlt", "pssmlt", "pm"})
         EXPECT_EQ(passes(none, rough), ReplayedPasses::None) << none;
+    // The selection of lamps is learned where there are several.
+    const Scene lamps =
+        build(sensor("0,0,3.5", "0,0,0", 8) + room() + area_lamp() + "<emitter type=\"point\"/>");
+    for (const std::string method : {"path", "bdpt"}) {
+        EXPECT_EQ(passes(method.c_str(), lamps), ReplayedPasses::Whole) << method;
+        EXPECT_EQ(passes((method + ":lights=power").c_str(), lamps), ReplayedPasses::Any) << method;
+    }
     // Specular connections are prepared where there is something smooth.
     for (const char* method : {"path", "bdpt", "path:specular_connections=on"}) {
         EXPECT_EQ(passes(method, rough), ReplayedPasses::Any) << method;

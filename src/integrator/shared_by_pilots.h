@@ -1,0 +1,22 @@
+#pragma once
+// What the pilots of `auto` learn or decide once for all of them.
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "guide/light_selection.h"
+#include "integrator/specular_pilot.h"
+#include "manifold/seed_photons.h"
+
+namespace etendue {
+
+/// Not for two renderings at a time.
+struct SharedByPilots {
+    std::shared_ptr<const SeedPhotons> photons;
+    std::map<std::string, SpecularPilot> specular;  ///< By method.
+    std::optional<LightSelections> lights;          ///< Of next events.
+};
+
+}  // namespace etendue
