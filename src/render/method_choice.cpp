@@ -278,6 +278,10 @@ private:
         std::vector<Contender> tried;
         std::vector<MethodChoice::Candidate> untried;
         for (Contender c : contenders_) {
+            if (c.has_chains() && is_beyond_chains()) {
+                untried.push_back(c.shown);
+                continue;
+            }
             const double cost = cost_of(c, each);
             const bool can_wait = is_first && tried.size() >= 2;
             if (can_wait && !budget_.can_spend(cost)) {
@@ -416,6 +420,14 @@ private:
                      first = c.pilot.start_seconds * std::max(1.0, begun / pixels);
         return first + c.prepared_seconds + (is_specular(c) ? specular_photon_seconds() : 0) +
                (c.guide ? training_seconds(walks_of_training()) : 0);
+    }
+    /// Whether specular connections of a method with light paths make light that chains hardly find. Pilots of chains that lack
+    /// it agree, as if nothing were missing.
+    bool is_beyond_chains() const {
+        const auto& pilots = shared_by_pilots_->specular;
+        return std::any_of(pilots.begin(), pilots.end(), [](const auto& p) {
+            return p.first != "path" && p.second.is_beyond_chains();
+        });
     }
     /// Whether the method has decided for specular connections.
     bool is_specular(const Contender& c) const {

@@ -89,6 +89,22 @@ TEST(MethodChoice, IsNoMethodThatFindsNoLightWhereAnotherOneDoes) {
     EXPECT_GE(black, 3);
 }
 
+/// The light of a point in a glass ball, on walls that are seen through the ball. Specular connections alone find it.
+TEST(MethodChoice, IsNoChainWhereConnectionsAloneFindLight) {
+    const auto pilots_of_chains = [](const std::string& xml) {
+        int images = 0;
+        for (const auto& c : choice_of(build(xml), "auto", 20).candidates)
+            if (c.method == "mlt" || c.method == "mmlt") images += c.images;
+        return images;
+    };
+    EXPECT_EQ(pilots_of_chains(front_camera(32) + room() + sphere("0.3,0.2,0.1", "0.25", kGlass) +
+                               "<emitter type=\"point\"><point name=\"position\" "
+                               "value=\"0.3,0.2,0.1\"/></emitter>"),
+              0);
+    // The lamp is large enough for hits.
+    EXPECT_GT(pilots_of_chains(lantern_room(front_camera(32))), 0);
+}
+
 TEST(MethodChoice, IsAFunctionOfSceneSeedAndBudget) {
     const Scene scene = scene_of_project("ring.xml", 160, 120);
     RenderSettings settings = settings_of(scene, "auto", 4);
