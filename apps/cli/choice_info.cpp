@@ -25,6 +25,14 @@ void ChoiceInfo::add_to(CLI::App& command) {
         ->needs(choice);
 }
 
+void ChoiceInfo::check(const std::string& integrator) const {
+    if (is_wanted && !integrator.empty() && !is_auto(IntegratorSpec::parse(integrator)))
+        throw UsageError(fmt::format(
+            "--choice shows what auto chooses: -i must be auto, with parameters or without, "
+            "but is {}",
+            integrator));
+}
+
 nlohmann::json ChoiceInfo::run(const Scene& scene, const std::string& integrator, uint64_t seed,
                                int threads) const {
     RenderRequest request;
@@ -34,11 +42,6 @@ nlohmann::json ChoiceInfo::run(const Scene& scene, const std::string& integrator
     request.seed = seed;
     request.threads = threads;
     const RenderSettings settings = settings_of(request, scene);
-    if (!is_auto(settings.integrator))
-        throw UsageError(fmt::format(
-            "--choice shows what auto chooses: -i must be auto, with parameters or without, "
-            "but is {}",
-            integrator));
     return nlohmann::json::parse(with_chosen_method(scene, settings).choice->to_text());
 }
 

@@ -18,7 +18,9 @@ struct ChoiceInfo {
     RenderLimits limits;
 
     void add_to(CLI::App& command);
-    /// What `auto` chooses, as in --stats. Throws std::runtime_error if `integrator` is not `auto`, perhaps with parameters.
+    /// Throws UsageError if `integrator` is neither empty nor `auto`, perhaps with parameters.
+    void check(const std::string& integrator) const;
+    /// What `auto` chooses, as in --stats.
     nlohmann::json run(const Scene& scene, const std::string& integrator, uint64_t seed,
                        int threads) const;
 };

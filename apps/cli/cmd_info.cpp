@@ -126,9 +126,17 @@ struct InfoOptions {
 void info(const InfoOptions& o) {
     const bool as_json = o.json;
     const GuideInfo& guide = o.guide;
-    if (SectionReader::is_one(o.scene.file)) return checkpoint_info(o.scene.file, as_json);
-    if (is_image(o.scene.file)) return image_info(o.scene.file, as_json);
+    const bool is_checkpoint = SectionReader::is_one(o.scene.file);
+    if (is_checkpoint || is_image(o.scene.file)) {
+        if (guide.is_wanted || o.choice.is_wanted)
+            throw UsageError(fmt::format("{} needs a scene, but {} is {}",
+                                         guide.is_wanted ? "--guide" : "--choice", o.scene.file,
+                                         is_checkpoint ? "a checkpoint" : "an image"));
+        return is_checkpoint ? checkpoint_info(o.scene.file, as_json)
+                             : image_info(o.scene.file, as_json);
+    }
     guide.check();
+    o.choice.check(o.integrator);
     SceneOptions loading = o.scene;
     loading.threads = o.threads;
     const Scene s = load_scene(loading);

@@ -172,6 +172,12 @@ struct Device {
     Device() {
         device = rtcNewDevice(kDevice);
         if (!device) throw std::runtime_error("Embree cannot start, perhaps for want of memory");
+        if (!rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_FILTER_FUNCTION_SUPPORTED)) {
+            rtcReleaseDevice(device);
+            throw std::runtime_error(
+                "this Embree has no filter functions, which masks need: it was built with "
+                "EMBREE_FILTER_FUNCTION=OFF");
+        }
         rtcSetDeviceMemoryMonitorFunction(device, memory_callback, &memory);
     }
     ~Device() { rtcReleaseDevice(device); }

@@ -121,8 +121,8 @@ public:
         return {threshold(c, c.is_of_whole_film ? &work.z.film : nullptr),
                 std::fabs(work.z.film_weight)};
     }
-    /// Makes C(s,t) of light vertices of `y`, t ≥ 2, and adds it as add() does. Unlike there, a join that roulette ends whatever
-    /// its weight is gets none.
+    /// Makes C(s,t) of light vertices of `y`, t ≥ 2, and adds it as add() does. Unlike there, the weight is not computed where
+    /// roulette ends the join with any weight.
     void add_connection(const SampleContext& c, const TechniqueCounts& counts, const SubPath& y,
                         int s, int t, const Roulette& roulette, Workspace& work, float factor = 1,
                         uint32_t draw = 0) const;

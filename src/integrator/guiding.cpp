@@ -531,13 +531,13 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
         all.samples, seed, learning_at_surfaces(guided, mode_ == Mode::Footprints), all.left_out);
     if (!guide->surfaces.is_empty()) guide->surfaces.set_contributions(all.contributions);
     guide->light_contribution = float(all.light_contribution / double(walks));
+    if (selects_lights) {
+        std::vector<Arrival> arrivals;
+        for (const EmissionRecord& r : all.emission)
+            arrivals.push_back({r.arrival, r.emitter->index});
+        guide->lights = learned_lights(pass.scene, std::move(arrivals));
+    }
     if (mode_ != Mode::Footprints) {
-        if (selects_lights) {
-            std::vector<Arrival> arrivals;
-            for (const EmissionRecord& r : all.emission)
-                arrivals.push_back({r.arrival, r.emitter->index});
-            guide->lights = learned_lights(pass.scene, std::move(arrivals));
-        }
         auto& seen = all.left_out[size_t(TransportMode::Importance)];
         learn_emission(pass.scene, all.emission, PlacedDensity(std::move(seen)),
                        learning_of_emission(guided), hash_combine(seed, 1), *guide);

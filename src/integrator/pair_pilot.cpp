@@ -40,9 +40,8 @@ PairPilot run_pair_pilot(const PassContext& pass, const Bidirectional& paths,
     std::vector<Block> blocks((walks + kBlock - 1) / kBlock);
     pass.for_each_other_path(blocks.size(), [&](uint64_t b, Sampler&, Workspace& work) {
         Sampler sampler(SamplerKind::Independent, seed);
-        RenderStats stats;  // not of the image
-        const WalkContext light = paths.light_walk(pass.scene, counts, stats),
-                          eye = paths.eye_walk(pass.scene, counts, stats);
+        const WalkContext light = paths.light_walk(pass.scene, counts, work.stats),
+                          eye = paths.eye_walk(pass.scene, counts, work.stats);
         for (uint64_t i = b * kBlock; i < std::min(walks, (b + 1) * kBlock); ++i) {
             sampler.start(0, i);
             trace_light_path(light, sampler, work.y);

@@ -201,8 +201,11 @@ public:
                         [](const auto& k) { return k.images > 0 && k.error() > 0; });
         const bool differs =
             !contenders_.empty() && contenders_.front().has_light != contenders_.back().has_light;
-        const std::string best =
-            has_seen_noise || differs ? contenders_.front().method() : kWithoutPilots;
+        // Alone, a method shows neither what it lacks nor whether another one is better.
+        const bool is_compared = contenders_.size() + dropped_.size() > 1 || untried_.empty();
+        const std::string best = !contenders_.empty() && is_compared && (has_seen_noise || differs)
+                                     ? contenders_.front().method()
+                                     : kWithoutPilots;
         std::stable_partition(choice.candidates.begin(), choice.candidates.end(),
                               [&](const auto& k) { return k.method == best; });
         choice.chosen = spec_of(best).to_string();
@@ -303,7 +306,9 @@ private:
                 continue;
             }
             c.prepared_seconds += c.pilot.prepared_seconds;
-            if (is_first && (cheapest_ == 0 || c.pilot.pass_seconds < cheapest_ * each)) {
+            // Chains that have found nothing make direct light alone, and seem cheap.
+            if (is_first && !c.has_chains() &&
+                (cheapest_ == 0 || c.pilot.pass_seconds < cheapest_ * each)) {
                 cheapest_ = c.pilot.pass_seconds / each;
                 cheapest_method_ = c.method();
                 budget_.set_sample_seconds(cheapest_);
@@ -339,12 +344,12 @@ private:
             const double before = budget_.seconds();
             double shortest = std::numeric_limits<double>::infinity();
             for (const Contender& c : contenders_) {
-                // Without light there is no error to judge by.
-                if (!c.has_light) continue;
+                // Without light, or without time for samples, there is no error to judge by.
+                if (!c.has_light || c.shown.start_seconds >= before) continue;
                 shortest = std::min(shortest, seconds_until(sqr(*budget_.error()), c.shown.error(),
                                                             before, c.shown.start_seconds));
             }
-            budget_.set_error_seconds(shortest);
+            if (std::isfinite(shortest)) budget_.set_error_seconds(shortest);
             score(width, height, ratio);
             apply(factors);
         }
@@ -500,7 +505,7 @@ private:
     Budget budget_;
     std::vector<Contender> contenders_;  ///< The best first, once there are pilots.
     std::vector<MethodChoice::Candidate> dropped_, untried_;
-    double cheapest_ = 0;  ///< Simulated seconds of a sample of the first contender.
+    double cheapest_ = 0;  ///< Simulated seconds of a sample of the cheapest contender so far.
     std::string cheapest_method_;
     double pixels_before_ = 0;  ///< Of the film of the last pilots.
     uint64_t number_ = 0;       ///< Of the next pilot.

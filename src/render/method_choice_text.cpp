@@ -11,8 +11,12 @@ namespace etendue {
 
 std::string MethodChoice::message() const {
     if (candidates.empty() || candidates.front().images == 0)
-        return fmt::format("auto: {}, without pilots, which would take too much of the time",
-                           chosen);
+        return pilots > 0
+                   ? fmt::format("auto: {}, since pilots would take too much of the time (those "
+                                 "that were stopped: {:.1f} s)",
+                                 chosen, seconds)
+                   : fmt::format("auto: {}, without pilots, which would take too much of the time",
+                                 chosen);
     std::string text = fmt::format("auto: {}", chosen);
     // Errors on other films are not comparable, and a black film has none.
     if (candidates.size() > 1 && candidates[1].pixels == candidates[0].pixels &&

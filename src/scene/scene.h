@@ -116,10 +116,10 @@ public:
     bool intersect(const Ray& ray, float u, SurfaceHit& hit, Passage& passage) const;
     /// The same without media.
     bool intersect(const Ray& ray, float u, SurfaceHit& hit) const;
-    /// The two parts of intersect(): find() leaves out the geometry of most hits, and complete() adds it; `u` is `number()`,
-    /// which is called where the ray meets the first masked surface. In between,
+    /// The two parts of intersect(): find() leaves out the geometry of most hits, and complete() adds it. Between the two parts,
     /// several rays can ask for the memory that complete() reads: first prefetch_primitive(), then prefetch_vertices(),
-    /// which reads what the former asked for; and after it for what the material reads.
+    /// which reads what the former asked for; and after it for what the material reads. Here `u` is `number()`, which is called
+    /// where the ray meets the first masked surface.
     bool find(const Ray& ray, const std::function<float()>& number, SurfaceHit& hit,
               Passage& passage) const;
     /// Like find(), but the ray passes all surfaces that are not certain to stop it, and `passage.attenuation` has their

@@ -36,12 +36,16 @@ IntegratorSpec limited(IntegratorSpec spec, int longest) {
     return spec;
 }
 
-/// References use neither Russian roulette nor specular connections, so that these of methods are verified as well.
+/// References use neither Russian roulette nor specular connections, and select lamps by power, so that these parts of methods are
+/// verified as well.
 IntegratorSpec as_reference(IntegratorSpec spec, int longest, const Scene& scene) {
     spec.params.emplace("rr_depth", std::to_string(longest + 1));
-    if (scene.may_have_chains() && !spec.make &&
-        integrator_entry(spec.name).info.has_param("specular_connections"))
-        spec.params.emplace("specular_connections", "off");
+    const auto leave_out = [&](const char* param, const char* value) {
+        if (!spec.make && integrator_entry(spec.name).info.has_param(param))
+            spec.params.emplace(param, value);
+    };
+    if (scene.may_have_chains()) leave_out("specular_connections", "off");
+    if (scene.has_emitter_choice()) leave_out("lights", "power");
     return spec;
 }
 

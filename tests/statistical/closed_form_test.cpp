@@ -501,7 +501,8 @@ std::string point_light(const std::string& position) {
 }
 
 /// The irradiance of a floor at a distance `aside` from an axis, by a point light of unit intensity on the axis whose light
-/// arrives at the distance reach(θ), which grows with the angle θ between its direction and the axis. `theta` becomes the angle.
+/// arrives at the distance reach(θ), which grows with the angle θ between its direction and the axis. `theta` becomes the
+/// angle.
 template <class Reach>
 double irradiance(const Reach& reach, double aside, double& theta) {
     double low = 0, high = 1.5;
