@@ -51,7 +51,7 @@ std::string lamp(const std::string& translation) {
                                         "value=\"9999,9999,9999\"/></emitter>");
 }
 
-// A sample chooses one of the lamps, so many lamps make direct light noisy, and one small lamp does not. The noise counts
+// A sample chooses one of the lamps by power, so many lamps make direct light noisy, and one small lamp does not. The noise counts
 // at a given film point, since chains have that of a textured surface as well.
 TEST(ChainPilot, MutationsFollowTheNoise) {
     const std::string checkered =
@@ -64,7 +64,8 @@ TEST(ChainPilot, MutationsFollowTheNoise) {
         lamps += lamp(fmt::format("x=\"{}\" y=\"-0.9\" z=\"{}\"", -0.9 + 0.25 * (i % 8),
                                   0.1 + 0.25 * (i / 8)));
     const Scene one = build(open + lamp("y=\"0.9\" z=\"0.9\"")), many = build(open + lamps);
-    for (const std::string name : {"mlt:p_large=0.1", "mmlt:p_large=0.1"}) {
+    for (const std::string name :
+         {"mlt:p_large=0.1,lights=power", "mmlt:p_large=0.1,lights=power"}) {
         // As many as take eight times as long as direct light.
         EXPECT_DOUBLE_EQ(figures(one, name)["mutations_per_pixel"], 8 / 1.25) << name;
         EXPECT_LT(figures(many, name)["mutations_per_pixel"], 2) << name;
