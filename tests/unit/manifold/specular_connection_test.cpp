@@ -185,6 +185,42 @@ INSTANTIATE_TEST_SUITE_P(Scenes, SpecularWeights,
                                                               Beside::Gathers)),
                          case_name);
 
+/// A point light between two mirrors, and photons that have come by way of the left one alone.
+TEST(SpecularSeeds, FindChainsThatNoPhotonHasTaken) {
+    const std::string mirror = "<bsdf type=\"twosided\"><bsdf type=\"conductor\"/></bsdf>";
+    const Scene scene = test::build(
+        test::front_camera(kPixels) +
+        test::rectangle("<rotate x=\"1\" angle=\"-90\"/><translate y=\"-1\"/>",
+                        test::diffuse("0.5,0.5,0.5")) +
+        test::rectangle("<rotate y=\"1\" angle=\"90\"/><translate x=\"-1\"/>", mirror) +
+        test::rectangle("<rotate y=\"1\" angle=\"90\"/><translate x=\"1\"/>", mirror) +
+        "<emitter type=\"point\"><point name=\"position\" value=\"0,0.3,0\"/></emitter>");
+    const TechniqueCounts counts{.hit = 1, .next_event = 1, .specular_depth = 1};
+    const Film film(scene.film(), scene.filter());
+    Workspace work;
+    const WalkContext walk{scene, counts, work.stats, {3, 10}};
+    Sampler sampler(SamplerKind::Independent, 5);
+    double with = 0, without = 0;
+    for (uint64_t i = 0; i < 40 * kPixels * kPixels; ++i) {
+        sampler.start(0, i);
+        trace_eye_path(walk, film, i % (kPixels * kPixels), sampler, work.z);
+        if (work.z.size() < 2 || !work.z[1].is_connectible) continue;
+        // Toward the image of the light in the left mirror.
+        const Vertex& z1 = work.z[1];
+        const Vec3 image{-2, 0.3f, 0};
+        const Vec3 left = z1.p + (image - z1.p) * ((-1 - z1.p.x) / (image.x - z1.p.x));
+        const SeedPhotons photons(std::vector<SeedPhoton>(
+            8, {.p = z1.p, .n = side_normal(z1), .left = left, .emitter = 0}));
+        for (const SeedPhotons* p : {&photons, static_cast<const SeedPhotons*>(nullptr)}) {
+            const SpecularLimits limits{.max_depth = 20, .photons = p};
+            const auto x = join_specular(scene, work.z, 2, limits, sampler, counts, work);
+            if (x) (p ? with : without) += double(luminance(x->contribution));
+        }
+    }
+    EXPECT_GT(without, 0);
+    EXPECT_NEAR(with / without, 1, 0.1);
+}
+
 /// So that a sample with many trials is replayed with the same ones, whatever roulette there was.
 TEST(SpecularTrials, DoNotDependOnRoulette) {
     const Scene scene = test::build(test::lantern_room(test::front_camera(kPixels)));
