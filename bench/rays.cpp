@@ -90,8 +90,7 @@ int main(int argc, char** argv) {
     const Report report("rays", options);
     measure_yardstick(report, options);
     for (const SceneFile& file :
-         {shared_scene("yard-cornell-mts06", "yard-cornell"),
-          shared_scene("yard-ring-mts06", "yard-ring"),
+         {own_scene("yard-cornell"), own_scene("yard-ring"),
           shared_scene("veach-ajar-mts3", "veach-ajar"), own_scene("cornell")}) {
         // Few pixels, so that the rays of one pass fit into memory.
         const auto scene = load_or_skip(report, file, {{256, 256}});

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import pathlib
+import re
 import subprocess
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -10,9 +11,10 @@ FIRST_SEED = 10**6  # Of no measured image.
 
 
 def hash_of_scene(file):
-    """Contents of the scene and, unless it is one of the project's, of all files in its folder."""
+    """Contents of the scene, and of the meshes that it names if it is one of the project's, and otherwise of all files in its folder."""
     own = file.parent == ROOT / "scenes"
-    files = [file] if own else sorted(f for f in file.parent.rglob("*") if f.is_file() and not f.name.startswith("ref"))
+    meshes = re.findall(r'name="filename" value="(meshes/[^"]+)"', file.read_text()) if own else []
+    files = [file, *(file.parent / mesh for mesh in meshes)] if own else sorted(f for f in file.parent.rglob("*") if f.is_file() and not f.name.startswith("ref"))
     digest = hashlib.sha256()
     for each in files:
         digest.update(f"{each.relative_to(file.parent)}\n{each.stat().st_size}\n".encode())

@@ -13,7 +13,9 @@ namespace {
 /// A scene, and targets from the results of other renderers.
 struct Case {
     SceneFile file;
-    /// Seconds after which the error is measured; 0 where there are no references ref1.pfm and ref2.pfm.
+    /// Folder in $ETENDUE_SCENES of the references ref1.pfm and ref2.pfm.
+    std::string references = {};
+    /// Seconds after which the error is measured, if there are references; 0: never.
     double error_seconds = 0;
     struct Aim {
         std::string integrator;
@@ -27,7 +29,8 @@ struct Case {
 /// Aims: `path` 1.5 times and `bdpt` twice the samples of the best peer; `bdpt` and each kind of chain at half the error
 /// of the best peer of its kind, and `upg+bdpt` at half the error of the best one of all.
 std::vector<Case> cases() {
-    return {{.file = shared_scene("yard-cornell-mts06", "yard-cornell"),
+    return {{.file = own_scene("yard-cornell"),
+             .references = "yard-cornell-mts06",
              .error_seconds = 30,
              .integrators = {{"path", 1.5 * 1.31e6, {}},
                              {"bdpt", 2 * 0.318e6, 0.0043},
@@ -35,7 +38,8 @@ std::vector<Case> cases() {
                              {"pssmlt", {}, 0.0145 / 2, true},
                              {"mmlt", {}, 0.0161 / 2, true},
                              {"mlt", {}, 0.0102 / 2, true}}},
-            {.file = shared_scene("yard-ring-mts06", "yard-ring"),
+            {.file = own_scene("yard-ring"),
+             .references = "yard-ring-mts06",
              .error_seconds = 60,
              .integrators = {{"path", 1.5 * 0.75e6, {}},
                              {"bdpt", 2 * 0.154e6, 0.19},
@@ -114,13 +118,21 @@ void measure_mutations(const Report& report, const Options& options, const Scene
 class Comparison {
 public:
     explicit Comparison(const Case& c)
-        : reference_(read_rgb(c.file.sibling("ref1.pfm").string()).pixels),
-          reference2_(read_rgb(c.file.sibling("ref2.pfm").string()).pixels) {}
+        : reference_(read_rgb(file(c, "ref1.pfm").string()).pixels),
+          reference2_(read_rgb(file(c, "ref2.pfm").string()).pixels) {}
+    static bool possible(const Case& c) {
+        return std::filesystem::exists(file(c, "ref1.pfm")) &&
+               std::filesystem::exists(file(c, "ref2.pfm"));
+    }
     ImageErrors errors(const std::vector<Rgb>& image) const {
         return image_errors(image, reference_, {.reference2 = reference2_, .ignore_above = 3});
     }
 
 private:
+    static std::filesystem::path file(const Case& c, const char* name) {
+        return shared_scene(c.references, c.file.name, name).path;
+    }
+
     std::vector<Rgb> reference_, reference2_;
 };
 
@@ -215,13 +227,16 @@ int main(int argc, char** argv) {
         if (c.error_seconds > 0)
             for (const char* method : {"pssmlt", "mmlt", "mlt"})
                 measure_mutations(report, options, *scene, c.file.name, method);
+        const bool with_errors = c.error_seconds > 0 && Comparison::possible(c);
+        if (c.error_seconds > 0 && !with_errors)
+            report.skip("error " + c.file.name, "there are no references");
         for (const Case::Aim& aim : c.integrators) {
             if (aim.learns) {
-                measure_learning_error(report, options, yardstick, *scene, c, aim);
+                if (with_errors) measure_learning_error(report, options, yardstick, *scene, c, aim);
                 continue;
             }
             measure_samples(report, options, yardstick, *scene, c.file.name, aim);
-            if (c.error_seconds > 0) measure_error(report, options, yardstick, *scene, c, aim);
+            if (with_errors) measure_error(report, options, yardstick, *scene, c, aim);
         }
     }
 }

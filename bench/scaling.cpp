@@ -7,8 +7,7 @@ int main(int argc, char** argv) {
     const Options options = Options::parse(argc, argv);
     const Report report("scaling", options);
     for (const SceneFile& file :
-         {shared_scene("yard-cornell-mts06", "yard-cornell"),
-          shared_scene("yard-ring-mts06", "yard-ring"), own_scene("cornell")}) {
+         {own_scene("yard-cornell"), own_scene("yard-ring"), own_scene("cornell")}) {
         const auto scene = load_or_skip(report, file);
         if (!scene) continue;
         for (const std::string integrator_name : {"path", "light", "bdpt"}) {

@@ -85,8 +85,6 @@ std::vector<double> each(const std::vector<A>& a, const F& f) {
 struct SceneFile {
     std::string name;
     std::filesystem::path path;
-
-    std::filesystem::path sibling(const char* file) const { return path.parent_path() / file; }
 };
 /// `file` in the folder `folder` of $ETENDUE_SCENES, or of shared/scenes beside the project.
 SceneFile shared_scene(const std::string& folder, const std::string& name,

@@ -318,11 +318,11 @@ def test_results_of_other_parts_are_made_whatever_one_does(tmp_path: Path, resul
 def test_results_are_left_out_without_what_they_show(tmp_path: Path, results: types.ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     c = results.dataclasses.replace(context(results, tmp_path), quick=False)
     monkeypatch.setenv("ETENDUE_SCENES", str(tmp_path))
-    (tmp_path / "yard-ring-1").mkdir()
-    with pytest.raises(results.LeftOut, match="yard-cornell") as reason:
-        results.available(["yard-ring", "yard-cornell", "lantern"], c)
-    assert "yard-ring" not in str(reason.value)
-    assert results.available(["yard-ring", "lantern"], c) == ["yard-ring", "lantern"]
+    (tmp_path / "veach-ajar-1").mkdir()
+    with pytest.raises(results.LeftOut, match="veach-bidir") as reason:
+        results.available(["veach-ajar", "veach-bidir", "lantern"], c)
+    assert "veach-ajar" not in str(reason.value)
+    assert results.available(["veach-ajar", "yard-ring"], c) == ["veach-ajar", "yard-ring"]
     with pytest.raises(results.LeftOut, match="build/release"):
         next(results.speed(c))
 

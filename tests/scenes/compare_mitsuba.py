@@ -25,8 +25,8 @@ import agreement
 EVERY = ("path", "bdpt", "light")
 SCENES = {
     "cornell-box": ("cornell-box-mts3/scene_v3.xml", EVERY),
-    "yard-cornell": ("yard-cornell-mts06/scene.xml", EVERY),
-    "yard-ring": ("yard-ring-mts06/scene.xml", EVERY),
+    "yard-cornell": (agreement.ROOT / "scenes/yard-cornell.xml", EVERY),
+    "yard-ring": (agreement.ROOT / "scenes/yard-ring.xml", EVERY),
     "veach-bidir": ("veach-bidir-mts3/scene.xml", EVERY[:2]),
     "veach-ajar": ("veach-ajar-mts3/scene.xml", EVERY[:2]),
     "staircase2": ("staircase2-mts3/scene.xml", EVERY[:2]),
