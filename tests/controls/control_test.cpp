@@ -161,6 +161,7 @@ std::vector<Planted> planted() {
         {"ChainNotInHits", lantern, "path:specular_connections=on", Lengths, 0},
         {"ChainSolutionsConfused", with_two_mirrors, "path:specular_connections=on", Lengths, 0,
          256},
+        {"ChainTrialsOfOtherLampPoint", lantern, "path:specular_connections=on", Lengths, 0},
         {"ChainWithoutFresnel", lantern, "path:specular_connections=on", Lengths, 0},
         {"OnePercentOfOneLength", lit_room, "bdpt:roulette=0", Lengths, 0, 256},
         {"LostConnections", by_glass, "bdpt:roulette=0", Lengths, 0, 256},

@@ -1,11 +1,15 @@
 // Scenes whose image is known in closed form, rendered by every integrator that can.
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <functional>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "bsdf/fresnel.h"
+#include "math/vec3d.h"
 #include "render_tiles.h"
 #include "test_scenes.h"
 
@@ -654,6 +658,165 @@ TEST(SpecularConnections, PointLightBehindMapsIsThatOfLightPaths) {
         expect_same_image(render_tiles(scene, "path" + depth + kSpecular, {4096}),
                           render_tiles(scene, "light" + depth, {32768}), 0.05, c.name);
     }
+}
+
+/// Water above the floor, in air: its surface is z = 3 + a sin(k x). A point light above it reaches a point of the floor by
+/// way of every point of the surface at which the optical length of the way is stationary.
+class SineWater {
+public:
+    static constexpr double kEta = 1.33, kSize = 2;
+
+    /// How much of a unit intensity arrives at a point of the floor, per area. `ways` becomes the number of roots.
+    double irradiance(double X, double Y, int& ways) const {
+        constexpr double kStep = kPi / 12 / kWaves, kFar = 1.2;
+        const auto f = [&](double x) { return slope_of_length(x, X, Y); };
+        double E = 0;
+        ways = 0;
+        const auto add = [&](double low, double high) {
+            const bool rises = f(low) < f(high);
+            for (int i = 0; i < 50; ++i) {
+                const double x = (low + high) / 2;
+                ((f(x) < 0) == rises ? low : high) = x;
+            }
+            ++ways;
+            E += irradiance_by(low, y_at(low, X, Y), X, Y);
+        };
+        std::array<double, 3> last{f(-kFar - kStep), f(-kFar), 0};
+        for (double x = -kFar; x < kFar; x += kStep, last[0] = last[1], last[1] = last[2]) {
+            last[2] = f(x + kStep);
+            if ((last[1] < 0) != (last[2] < 0)) add(x, x + kStep);
+            // Two roots between the steps, near the extremum of values with one sign.
+            const double sign = last[1] < 0 ? -1 : 1;
+            if (sign * last[0] < 0 || sign * last[2] < 0 ||
+                sign * last[1] > std::min(sign * last[0], sign * last[2]))
+                continue;
+            double low = x - kStep, high = x + kStep;
+            for (int i = 0; i < 60; ++i) {
+                const double a = low + (high - low) / 3, b = high - (high - low) / 3;
+                (sign * f(a) < sign * f(b) ? high : low) = sign * f(a) < sign * f(b) ? b : a;
+            }
+            if (sign * f(low) > 0) continue;
+            add(x - kStep, low);
+            add(low, x + kStep);
+        }
+        return E;
+    }
+
+    /// The scene's objects: light, floor, and the surface as a mesh whose normals are those of the sine at its vertices. Between
+    /// these, 1/256 of a wave apart, the interpolated normals differ from those of the sine by at most 3e-5 radians.
+    SceneDescription scene(const std::string& others) const {
+        SceneDescription d = parse_mitsuba_xml(
+            "<scene version=\"3.0.0\">" + others + floor_of(kFloor) +
+                fmt::format("<emitter type=\"point\"><point name=\"position\" value=\"{},{},{}\"/>"
+                            "<rgb name=\"intensity\" value=\"3,2,1\"/></emitter></scene>",
+                            kLight.x, kLight.y, kLight.z),
+            "test.xml");
+        MeshData mesh;
+        constexpr double kWidth = 2 * kPi / kWaves / 256;
+        const auto strips = uint32_t(2 * kSize / kWidth);
+        for (uint32_t i = 0; i <= strips; ++i) {
+            const double x = -kSize + kWidth * double(i);
+            for (const double y : {-kSize, kSize}) {
+                mesh.positions.push_back(to_float(Vec3d{x, y, height(x)}));
+                mesh.normals.push_back(to_float(normal(x)));
+            }
+            if (i == strips) break;
+            mesh.triangles.push_back({2 * i, 2 * i + 2, 2 * i + 1});
+            mesh.triangles.push_back({2 * i + 1, 2 * i + 2, 2 * i + 3});
+        }
+        d.meshes.emplace_back(std::move(mesh));
+        const int water = int(d.objects.size());
+        SceneObject bsdf, surface;
+        bsdf.category = "bsdf";
+        bsdf.type = "dielectric";
+        bsdf.params = {{"int_ior", kEta, {}}, {"ext_ior", 1.0, {}}};
+        surface.category = "shape";
+        surface.type = "mesh";
+        surface.params = {{"mesh", int64_t(0), {}}};
+        surface.children = {{"", water, {}}};
+        d.objects.push_back(bsdf);
+        d.objects.push_back(surface);
+        d.roots.push_back(water + 1);
+        return d;
+    }
+
+private:
+    static constexpr double kWaves = 30, kAmplitude = 0.013;  // k and a
+    static constexpr Vec3d kLight{0.3, -0.2, 6};
+
+    static double height(double x) { return 3 + kAmplitude * std::sin(kWaves * x); }
+    static double slope(double x) { return kAmplitude * kWaves * std::cos(kWaves * x); }
+    static Vec3d normal(double x) { return normalize(Vec3d{-slope(x), 0, 1}); }
+
+    /// Of the way by the surface at x that is shortest in y.
+    static double y_at(double x, double X, double Y) {
+        const double a2 = sqr(x - kLight.x) + sqr(height(x) - kLight.z),
+                     b2 = sqr(x - X) + sqr(height(x));
+        double y = (kLight.y + Y) / 2;
+        for (int i = 0; i < 4; ++i) {
+            const double a = y - kLight.y, b = y - Y, d1 = std::sqrt(a2 + a * a),
+                         d2 = std::sqrt(b2 + b * b);
+            y -= (a / d1 + kEta * b / d2) / (a2 / (d1 * d1 * d1) + kEta * b2 / (d2 * d2 * d2));
+        }
+        return y;
+    }
+    /// Derivative by x of the optical length of the way.
+    static double slope_of_length(double x, double X, double Y) {
+        const double y = y_at(x, X, Y), z = height(x), dz = slope(x);
+        const double d1 = std::hypot(x - kLight.x, y - kLight.y, z - kLight.z),
+                     d2 = std::hypot(x - X, y - Y, z);
+        return (x - kLight.x + (z - kLight.z) * dz) / d1 + kEta * (x - X + z * dz) / d2;
+    }
+    /// Where the light that arrives at a point of the surface meets the floor; its cosine there.
+    static std::array<double, 2> floor_by(double x, double y, double& cosine) {
+        const Vec3d p{x, y, height(x)}, n = normal(x), d = normalize(p - kLight);
+        cosine = -dot(d, n);
+        const double C = std::sqrt(1 - (1 - sqr(cosine)) / sqr(kEta));
+        const Vec3d t = d * (1 / kEta) + n * (cosine / kEta - C);
+        return {p.x - t.x * p.z / t.z, p.y - t.y * p.z / t.z};
+    }
+    /// What arrives by one way: solid angle at the light over area of the floor, from differences, and what is transmitted.
+    static double irradiance_by(double x, double y, double X, double Y) {
+        constexpr double kDelta = 1e-6;
+        double cosine, other;
+        const auto at = floor_by(x, y, cosine);
+        EXPECT_NEAR(at[0], X, 1e-8);
+        EXPECT_NEAR(at[1], Y, 1e-8);
+        const auto x0 = floor_by(x - kDelta, y, other), x1 = floor_by(x + kDelta, y, other),
+                   y0 = floor_by(x, y - kDelta, other), y1 = floor_by(x, y + kDelta, other);
+        const double det = ((x1[0] - x0[0]) * (y1[1] - y0[1]) - (x1[1] - x0[1]) * (y1[0] - y0[0])) /
+                           sqr(2 * kDelta);
+        const Vec3d p{x, y, height(x)};
+        const double d2 = dot(p - kLight, p - kLight), area = std::sqrt(1 + sqr(slope(x)));
+        return cosine * area / d2 / std::fabs(det) *
+               (1 - double(fresnel_dielectric(float(cosine), float(kEta)).R));
+    }
+};
+
+/// Three to five ways, and at caustics two that are nearly one. Seen through a pane at the camera, so that bdpt has no other
+/// technique.
+TEST(SpecularConnections, PointLightAboveSineWater) {
+    const SineWater water;
+    const Scene scene =
+        build_scene(water.scene(camera_above("perspective", 1) +
+                                rectangle("<scale value=\"0.011\"/><translate z=\"1.98\"/>",
+                                          "<bsdf type=\"thindielectric\">" + kPlainGlass)));
+    int points = 0, all_ways = 0;
+    const auto radiance = [&](float x, float y) {
+        const Vec3 p = on_plane(1, x, y);
+        constexpr int kParts = 4;  // of the distance of two points in x
+        double E = 0;
+        for (int i = 0; i < kParts; ++i) {
+            int ways;
+            E += water.irradiance(double(p.x) + ((i + 0.5) / kParts - 0.5) / 32, double(p.y), ways);
+            ++points, all_ways += ways;
+        }
+        const float F = fresnel_dielectric(2 / std::hypot(p.x, p.y, 2.0f), kGlassEta).R;
+        return kFloor * Rgb(3, 2, 1) * ((1 - 2 * F / (1 + F)) * float(E / kParts) * kInvPi);
+    };
+    expect_image(scene, {"path:max_depth=4" + kSpecular, "bdpt:max_depth=4" + kSpecular}, 2048,
+                 radiance, 0.045);
+    EXPECT_GT(double(all_ways) / points, 3);
 }
 
 /// At the centre of a glass ball, light leaves straight, or returns to the centre and leaves on the other side.
