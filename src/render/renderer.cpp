@@ -359,8 +359,8 @@ class Renderer::Pass {
 public:
     /// The pass that follows `passes` others.
     Pass(Renderer& renderer, uint32_t passes, const std::atomic<bool>& drop)
-        : r_(renderer), drop_(drop), passes_(passes), limit_(r_.settings_.cost_limit),
-          cost_(limit_ ? r_.cost() : 0), cost_factor_(limit_ ? limit_->renderings : 1),
+        : r_(renderer), drop_(drop), passes_(passes),
+          cost_(r_.settings_.cost_limit, r_.settings_.cost_limit ? r_.cost() : 0),
           index_(uint32_t(r_.settings_.first_pass) + passes), numbers_(r_.numbers(passes)),
           splat_scale_(r_.light_paths_ > 0 ? float(1.0 / double(r_.light_paths_)) : 0.0f) {}
 
@@ -373,7 +373,7 @@ public:
                                .so_far = r_.stats_});
     }
     void prepare() {
-        cost_factor_ = 1;
+        cost_.count_once();
         r_.integrator_->prepare(context());
         // These paths are no part of the image.
         r_.preparation_ += r_.workers_->take_stats();
@@ -406,27 +406,6 @@ private:
     void go_on() const {
         if (drop_.load(std::memory_order_relaxed)) throw PassDropped();
     }
-    /// Adds what a worker has done to the cost of the pass, and ends the pass where it is too high.
-    class CostMeter {
-    public:
-        CostMeter(const Pass& pass, const Workspace& work)
-            : pass_(pass), work_(work), before_(cost()) {}
-        void update() {
-            if (!pass_.limit_) return;
-            // The sum has rounding errors that depend on the order. Where it is too high, the exact one is, too.
-            constexpr double kRounding = 1e-6;
-            const double now = cost(),
-                         more = pass_.cost_factor_ * (now - std::exchange(before_, now));
-            if (pass_.cost_.fetch_add(more) + more > (1 + kRounding) * pass_.limit_->most)
-                throw PassDropped();
-        }
-
-    private:
-        double cost() const { return pass_.limit_ ? pass_.limit_->cost(work_.stats) : 0; }
-        const Pass& pass_;
-        const Workspace& work_;
-        double before_;
-    };
     Workspace& workspace() const {
         Workspace& work = r_.workers_->spaces.local();
         work.is_observed = r_.settings_.observer != nullptr;
@@ -448,7 +427,7 @@ private:
     class SamplesInTurn {
     public:
         SamplesInTurn(const Pass& pass, uint64_t chunk)
-            : pass_(pass), chunk_(chunk), work_(pass.workspace()), meter_(pass, work_),
+            : pass_(pass), chunk_(chunk), work_(pass.workspace()), meter_(pass.cost_, work_),
               sink_(pass.receivers(work_)),
               samplers_(kWalksInTurn, Sampler(pass.r_.settings_.sampler, pass.numbers_.seed)) {
             contexts_.reserve(kWalksInTurn);
@@ -487,7 +466,7 @@ private:
         const Pass& pass_;
         uint64_t chunk_;
         Workspace& work_;
-        CostMeter meter_;
+        RunningCost::Meter meter_;
         FilmSink sink_;
         std::vector<Sampler> samplers_;
         std::vector<SampleContext> contexts_;
@@ -498,7 +477,7 @@ private:
     void for_each_sample(uint64_t count, const Use& use) const {
         parallel_for(chunks(count), [&](uint64_t chunk) {
             Workspace& work = workspace();
-            CostMeter meter(*this, work);
+            RunningCost::Meter meter(cost_, work);
             Sampler sampler(r_.settings_.sampler, numbers_.seed);
             FilmSink sink(receivers(work));
             const uint64_t end = std::min(count, (chunk + 1) * kChunk);
@@ -530,7 +509,7 @@ private:
                         Sampler sampler(r_.settings_.sampler,
                                         pilot_seed(numbers_.seed, PilotUse::OtherPaths));
                         Workspace& work = workspace();
-                        CostMeter meter(*this, work);
+                        RunningCost::Meter meter(cost_, work);
                         work.stats.time_factor = RenderStats::time_factor_of(i);
                         task(i, sampler, work);
                         meter.update();
@@ -541,7 +520,7 @@ private:
                     parallel_for(count, [&](uint64_t i) {
                         go_on();
                         Workspace& work = workspace();
-                        CostMeter meter(*this, work);
+                        RunningCost::Meter meter(cost_, work);
                         FilmSplats splats(receivers(work));
                         work.is_observed = splats.needs_joins();
                         task(i, splats, work);
@@ -555,9 +534,7 @@ private:
     Renderer& r_;
     const std::atomic<bool>& drop_;
     uint32_t passes_;
-    const std::optional<CostLimit>& limit_;
-    mutable std::atomic<double> cost_;  ///< So far, of what counts for the limit.
-    double cost_factor_;
+    mutable RunningCost cost_;
     uint32_t index_;
     Numbers numbers_;
     float splat_scale_;

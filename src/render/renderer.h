@@ -10,6 +10,7 @@
 
 #include "integrator/integrator.h"
 #include "render/contribution_observer.h"
+#include "render/cost_limit.h"
 #include "render/technique_images.h"
 #include "system/ranks.h"
 
@@ -42,16 +43,6 @@ struct RenderOptions : RenderLimits {
 };
 
 struct MethodChoice;
-
-/// Ends a rendering in the pass, or in the preparation of the first one, that would make it cost more than `most`. Whether it ends
-/// does not depend on the number of threads: it does if the whole pass would cost more.
-struct CostLimit {
-    std::function<double(const RenderStats&)> cost;
-    double most;
-    /// Passes count so many times, and Integrator::prepare() once: of several such renderings, which must not cost more
-    /// together, only the first one prepares anything.
-    double renderings = 1;
-};
 
 struct RenderSettings : RenderOptions {
     IntegratorSpec integrator{"path", {}};
@@ -186,10 +177,7 @@ public:
     /// Whether Integrator::prepare() has ended for the last pass that was begun.
     bool is_prepared() const { return is_prepared_; }
     /// What counts for CostLimit; for renderers that have one.
-    double cost() const {
-        const CostLimit& limit = *settings_.cost_limit;
-        return limit.cost(preparation_) + limit.renderings * limit.cost(stats_);
-    }
+    double cost() const { return settings_.cost_limit->cost_of(preparation_, stats_); }
     /// Time of the finished passes in run(), and of the choice of the method before the first.
     double seconds() const { return seconds_; }
     ErrorEstimate error() const;  ///< Of the film, computed by the threads of this renderer.
