@@ -13,7 +13,9 @@ namespace etendue {
 
 void ChoiceInfo::add_to(CLI::App& command) {
     CLI::Option* choice = command.add_flag(
-        "--choice", is_wanted, "Run the pilots of auto, and print what they say of each method");
+        "--choice", is_wanted,
+        "Run the pilots of auto, or of a method with guide=auto, and print what they say of each "
+        "candidate");
     command.add_option("--spp", limits.spp, "Choose for a rendering of so many samples per pixel")
         ->check(must_be_above_0)
         ->needs(choice);
@@ -26,9 +28,9 @@ void ChoiceInfo::add_to(CLI::App& command) {
 }
 
 void ChoiceInfo::check(const std::string& integrator) const {
-    if (is_wanted && !integrator.empty() && !is_auto(IntegratorSpec::parse(integrator)))
+    if (is_wanted && !integrator.empty() && !is_chosen_by_pilots(IntegratorSpec::parse(integrator)))
         throw UsageError(fmt::format(
-            "--choice shows what auto chooses: -i must be auto, with parameters or without, "
+            "--choice shows what pilots choose: -i must be auto, or a method with guide=auto, "
             "but is {}",
             integrator));
 }

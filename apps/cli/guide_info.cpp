@@ -168,7 +168,6 @@ json GuideInfo::run(const Scene& scene, const std::string& integrator, uint64_t 
            {"gain_lights", guide.lights.gain()},
            {"share_eye", mean[0]},
            {"share_light", mean[1]},
-           {"kept_by_auto", learned.is_kept_by_auto()},
            {"emitter_choices", to_json(learned.emitter_choices(5))}};
     if (!place.is_null()) j["place"] = place;
     return j;
@@ -187,8 +186,6 @@ std::string guide_text(const json& j) {
     text += fmt::format("    next events gain {:.2f} nats by the selection of emitters\n",
                         number("gain_lights"));
     text += choices_text(j["emitter_choices"], "of the light paths");
-    text += fmt::format("    guide=auto  {} it\n",
-                        j["kept_by_auto"].get<bool>() ? "keeps" : "does without");
     return j.contains("place") ? text + place_text(j["place"]) : text;
 }
 

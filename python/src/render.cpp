@@ -21,7 +21,6 @@
 #include "bindings.h"
 #include "image/denoiser.h"
 #include "image/image_io.h"
-#include "integrator/auto.h"
 #include "math/statistics.h"
 #include "render/aov.h"
 #include "render/merging.h"
@@ -68,7 +67,7 @@ RenderSettings with_method(const Scene& scene, const RenderSettings& settings,
             chosen.choice = std::make_shared<const MethodChoice>(choice);
         return chosen;
     }
-    if (!is_auto(settings.integrator)) return settings;
+    if (!is_chosen_by_pilots(settings.integrator)) return settings;
     use_threads();
     RenderSettings chosen;
     Background background;

@@ -257,9 +257,6 @@ GuideLearning learning_of_emission(GuidedWalks walks) {
     return learning;
 }
 
-/// Least gain of eye walks alone, in nats, from which on `auto` guides them at surfaces.
-constexpr float kLeastGainAlone = 0.57f;
-
 template <class T>
 void move_to_end(std::vector<T>& to, std::vector<T>& from) {
     to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
@@ -348,8 +345,8 @@ std::vector<ParamInfo> Guiding::params(GuideRefits refits) {
               "pass. A refit traces as many, before the first of passes 1, 4, 16, 64 … at which "
               "the image has had 8, 64, 512 … times as many samples.";
     return {{"guide", ParamKind::String, "off",
-             "Learned directions for the walks: off, on, or auto (on, unless the training shows "
-             "that it gains too little). hp02 (experimental, for comparisons) guides eye walks "
+             "Learned directions for the walks: off, on, or auto (pilots compare both). hp02 "
+             "(experimental, for comparisons) guides eye walks "
              "alone, by footprints of photons [Hey & Purgathofer 2002]."},
             {"guide_walks", ParamKind::Int, "100000", walks},
             {"guide_roulette", ParamKind::Bool, "true",
@@ -365,8 +362,9 @@ std::vector<ParamInfo> Guiding::lights_params() {
 }
 
 Guiding::Guiding(const IntegratorParams& p) {
+    // Before there is an integrator, pilots replace auto by off or on; see with_chosen_method().
     constexpr std::array<Choice<Mode>, 4> kModes{
-        {{"off", Mode::Off}, {"on", Mode::On}, {"auto", Mode::Auto}, {"hp02", Mode::Footprints}}};
+        {{"off", Mode::Off}, {"on", Mode::On}, {"auto", Mode::Off}, {"hp02", Mode::Footprints}}};
     mode_ = p.choice("guide", kModes);
     walks_ = uint64_t(p.integer("guide_walks", 256, 1 << 20));
     has_roulette_ = p.flag("guide_roulette");
@@ -376,24 +374,18 @@ Guiding::Guiding(const IntegratorParams& p) {
     pilots_ = p.shared_by_pilots();
 }
 
-bool Guiding::gains_little(const Guide& guide, GuidedWalks walks) {
-    // In nats; these tell the scenes of docs/guiding.md apart. Guided eye walks take paths away from techniques that need
-    // no guide, so they must gain more than emission, without which most light paths may be lost. What light walks gain
-    // says little about methods that have both walks. Alone, eye walks gain 0.59 to 0.64 on veach-bidir, where the guide of
-    // `path` pays, and 0.51 to 0.56 on many-lights, where it does not. With both walks they gain 2.9 on lantern and at most
-    // 0.3 elsewhere; emission gains 1.3 and more, or less than 0.1.
-    constexpr float kLeastEyeGain = 1.0f, kLeastLightGain = 0.4f;
-    const bool eye = guide.surfaces.gain(TransportMode::Radiance) >=
-                     (walks == GuidedWalks::Eye ? kLeastGainAlone : kLeastEyeGain),
-               light = guide.surfaces.gain(TransportMode::Importance) >= kLeastLightGain,
-               emission = guide.emission_gain >= kLeastLightGain;
+bool Guiding::may_gain(const Guide& guide, GuidedWalks walks) {
+    constexpr float kLeastGain = 0.01f;  // in nats; less is what samples happen to say
+    const bool eye = guide.surfaces.gain(TransportMode::Radiance) >= kLeastGain,
+               light = guide.surfaces.gain(TransportMode::Importance) >= kLeastGain,
+               emission = guide.emission_gain >= kLeastGain;
     switch (walks) {
-    case GuidedWalks::Eye: return !eye;
-    case GuidedWalks::Light: return !light && !emission;
+    case GuidedWalks::Eye: return eye;
+    case GuidedWalks::Light: return light || emission;
     case GuidedWalks::Both:
-    case GuidedWalks::BothWithPairs: return !eye && !emission;
+    case GuidedWalks::BothWithPairs: break;
     }
-    return true;
+    return eye || light || emission;
 }
 
 bool Guiding::gains_nothing(const Guide& guide, GuidedWalks walks) const {
@@ -450,7 +442,6 @@ void Guiding::train_walks(const PassContext& pass, const DepthOptions& depth, Gu
     constexpr int kRounds = 4;  // Each has twice the walks of the last.
     constexpr uint64_t kFirstPart = (1 << kRounds) - 1;
     const auto passes = uint32_t(pass.film.passes());
-    if (is_given_up_) return;
     const uint64_t refits =
         (std::bit_width(std::max<uint64_t>(1, passes * pass.pixels / walks_)) - 1) / 3;
     // As many walks would not gain more where a guide gains nothing.
@@ -475,13 +466,8 @@ void Guiding::train_walks(const PassContext& pass, const DepthOptions& depth, Gu
         next = trained(pass, depth, walks, light, &teacher, walks_, seed, has_roulette_,
                        selects_lights);
     }
-    is_given_up_ = passes == 0 && mode_ == Mode::Auto && gains_little(*next, walks);
-    if (is_given_up_) {
-        next = guide_of_lights(std::move(next->lights));
-    } else {
-        next->has_roulette = has_roulette_;
-        if (!given_) next->uses_surfaces = !gains_nothing(*next, walks);
-    }
+    next->has_roulette = has_roulette_;
+    if (!given_) next->uses_surfaces = !gains_nothing(*next, walks);
     guide_ = std::move(next);
     refits_ = refits;
 }
@@ -547,7 +533,6 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
 
 void Guiding::save(LearnedState& to) const {
     to.put(refits_);
-    to.put(is_given_up_);
     to.put(seconds_);
     to.put(guide_ != nullptr);
     if (guide_) guide_->save(to);
@@ -555,7 +540,6 @@ void Guiding::save(LearnedState& to) const {
 
 void Guiding::load(LearnedState& from) {
     from.get(refits_);
-    from.get(is_given_up_);
     from.get(seconds_);
     bool has_guide = false;
     from.get(has_guide);

@@ -39,9 +39,9 @@ public:
     /// What guides walks and next events until the next call of train(); nullptr where nothing does.
     const Guide* guide() const { return guide_.get(); }
     /// Whether it guides walks, and not next events alone.
-    bool guides_walks() const { return guide_ && is_on() && !is_given_up_; }
-    /// Whether a guide gains so little that `auto` does without it.
-    static bool gains_little(const Guide& guide, GuidedWalks walks);
+    bool guides_walks() const { return guide_ && is_on(); }
+    /// Whether it is worth while to compare renderings with this guide and without.
+    static bool may_gain(const Guide& guide, GuidedWalks walks);
 
     void save(LearnedState& to) const;
     void load(LearnedState& from);
@@ -50,7 +50,7 @@ public:
     void add_figures(std::vector<std::pair<std::string, double>>& figures) const;
 
 private:
-    enum class Mode { Off, On, Auto, Footprints };
+    enum class Mode { Off, On, Footprints };
     /// `teacher` guides the walks that train; `for_roulette`: whether they are joined, so that their contributions can be
     /// learned.
     std::unique_ptr<Guide> trained(const PassContext& pass, const DepthOptions& depth,
@@ -77,7 +77,6 @@ private:
     std::unique_ptr<Guide> guide_;
     uint64_t refits_ =
         0;  ///< Logarithm to base 8 of the samples over the walks, at the last call of train().
-    bool is_given_up_ = false;                ///< By Mode::Auto.
     double seconds_ = 0;                      ///< Spent in train().
     std::shared_ptr<SharedByPilots> pilots_;  ///< Null in renderings that are no pilots.
 };

@@ -18,13 +18,16 @@ struct MethodCost {
     double factor;          ///< What no counter counts, relative to `path`.
     double sample_seconds;  ///< Of a pixel, in the middle of the scenes of the fit.
 };
-constexpr std::array<MethodCost, 7> kMethodCosts{{{"path", 1.00, 1.5e-6},
-                                                  {"bdpt", 1.22, 3.6e-6},
-                                                  {"pcbpt", 1.27, 4.0e-6},
-                                                  {"upg+bdpt", 1.66, 8.0e-6},
-                                                  {"vcm", 1.56, 4.0e-6},
-                                                  {"mlt", 1.52, 8.0e-6},
-                                                  {"mmlt", 0.98, 9.0e-6}}};
+constexpr std::array<MethodCost, 10> kMethodCosts{{{"path", 1.00, 1.5e-6},
+                                                   {"bdpt", 1.22, 3.6e-6},
+                                                   {"pcbpt", 1.27, 4.0e-6},
+                                                   {"upg+bdpt", 1.66, 8.0e-6},
+                                                   {"vcm", 1.56, 4.0e-6},
+                                                   {"mlt", 1.52, 8.0e-6},
+                                                   {"mmlt", 0.98, 9.0e-6},
+                                                   {"light", 1.00, 1.5e-6},
+                                                   {"upg", 1.66, 7.0e-6},
+                                                   {"pssmlt", 1.00, 8.0e-6}}};
 
 const MethodCost& cost_of(const std::string& method) {
     for (const MethodCost& m : kMethodCosts)

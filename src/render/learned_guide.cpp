@@ -153,8 +153,8 @@ LearnedGuide::LearnedGuide(const Scene& scene, IntegratorSpec spec, uint64_t see
     : scene_(scene), method_(spec.name), seed_(seed), threads_(threads),
       guiding_(train(scene, spec, seed, threads)) {}
 
-bool LearnedGuide::is_kept_by_auto() const {
-    return !Guiding::gains_little(guide(), guided_walks(method_));
+bool LearnedGuide::may_gain() const {
+    return Guiding::may_gain(guide(), guided_walks(method_));
 }
 
 template <class Pmf>

@@ -63,8 +63,8 @@ public:
 
     const Guide& guide() const { return *guiding_.guide(); }
     const std::string& method() const { return method_; }
-    /// Whether guide=auto would keep the guide of the method.
-    bool is_kept_by_auto() const;
+    /// See Guiding::may_gain().
+    bool may_gain() const;
 
     /// The emitters that light paths choose most often: at most so many, the most frequent one first; empty where light paths
     /// choose by power.

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <optional>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -16,6 +15,7 @@
 #include "render/candidates.h"
 #include "render/cost_table.h"
 #include "render/learned_guide.h"
+#include "render/pilot_budget.h"
 #include "render/pilot_rendering.h"
 #include "render/render_request.h"
 #include "sampler/pilot_seed.h"
@@ -25,9 +25,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// The largest part of a rendering that pilots may take, by simulated time. They are planned to take a little less, since
-/// what they take is not known before.
-constexpr double kShare = 0.08, kPlannedShare = 0.075;
 /// Pixels of the first film of pilots, and of the largest one. From one to the next, there are kGrowth times as many, so
 /// that the last pilots take most of the time.
 constexpr double kFirstPixels = 768, kMostPixels = 49152, kGrowth = 4;
@@ -36,59 +33,86 @@ constexpr double kHopeless = 3;
 /// Chains of pilots are short, and see less of where chains stay. On veach-ajar, veach-bidir and two-rooms, the errors of `mlt`
 /// after 60 s are 0.6 to 3 times those predicted without this factor.
 constexpr double kLongChains = 1.5;
-/// Simulated seconds that a rendering without limits is taken to have.
-constexpr double kUnlimitedSeconds = 60;
-/// relMSE of an image with one sample per pixel, before there are pilots: of simple scenes.
-constexpr double kPlausibleError = 1;
-/// Walks of each kind that train the guide of a pilot.
-constexpr uint64_t kWalksOfPilot = 16384;
-/// The same of the rendering, whose methods have their default parameters.
-uint64_t walks_of_training() {
-    for (const ParamInfo& p : Guiding::params())
-        if (std::string_view(p.name) == "guide_walks") return std::stoull(p.fallback);
-    throw std::logic_error("guides have no parameter guide_walks");
-}
+/// Walks of each kind that train the guide of a pilot, at least. More of them, up to those of the rendering, train it where this
+/// takes at most a part of what guides may take.
+constexpr uint64_t kLeastWalks = 16384;
+constexpr double kShareOfTraining = 1.0 / 3;
+/// What `auto` spends on candidates whose guides are new, relative to what pilots may still take.
+constexpr double kShareOfGuides = 1.0 / 4;
 
 const char* const kWithoutPilots = "bdpt";
 const char* const kNoLimit = "-1";  // of max_depth
 
-/// The integrator that was asked for, with all parameters of `auto` that are not empty.
-std::string with_all_params(IntegratorSpec spec) {
-    for (const ParamInfo& p : auto_entry().info.params)
-        if (*p.fallback) spec.params.emplace(p.name, p.fallback);
+bool has_guide_by_pilots(const IntegratorSpec& spec) {
+    const auto guide = spec.params.find("guide");
+    return !spec.make && guide != spec.params.end() && guide->second == "auto" &&
+           integrator_entry(spec.name).info.has_param("guide");
+}
+
+/// The integrator that was asked for; with all parameters of `auto` that are not empty.
+std::string asked_text(IntegratorSpec spec) {
+    if (is_auto(spec))
+        for (const ParamInfo& p : auto_entry().info.params)
+            if (*p.fallback) spec.params.emplace(p.name, p.fallback);
     return spec.to_string();
 }
 
 /// A method, and what its last pilot has shown.
 struct Contender {
-    MethodChoice::Candidate shown;  ///< Its method is without the parameters of `auto`.
-    std::string in_pilots;          ///< The method with parameters for short runs.
-    std::shared_ptr<const Guide> guide = nullptr;
+    MethodChoice::Candidate shown = {};  ///< Its method is the name, and whether there is a guide.
+    IntegratorSpec spec;                 ///< Of the rendering.
+    std::shared_ptr<const Guide> guide = nullptr;  ///< That of its pilots.
     std::string unguided = "";  ///< The method of which this is the one with a guide.
-    bool has_light = false;     ///< Whether its last pilot has met any.
-    MethodPilot pilot;
+    bool has_tried_guide = false;
+    bool has_light = false;  ///< Whether its last pilot has met any.
+    MethodPilot pilot = {};
     /// Of the last pilot; 0: there was none.
     struct History {
         double image_noise = 0;
         double start_a_pixel = 0;  ///< Simulated seconds of MethodPilot::start_seconds.
-    } history;
+    } history = {};
     double prepared_seconds = 0;  ///< Simulated, of what its first pilot has prepared.
 
-    static Contender of(const std::string& method, const std::string& params = "") {
-        return {
-            .shown = {.method = method}, .in_pilots = method + params, .pilot = {}, .history = {}};
+    static Contender of(IntegratorSpec spec) {
+        Contender c{.spec = std::move(spec)};
+        c.shown.method = c.spec.name;
+        return c;
+    }
+    /// The same with a guide, which it has in its pilots.
+    Contender guided_by(std::shared_ptr<const Guide> trained) const {
+        Contender c = of(spec);
+        c.spec.params["guide"] = "on";
+        c.shown.method += ":guide=on";
+        c.guide = std::move(trained);
+        c.unguided = method();
+        c.has_tried_guide = true;
+        c.prepared_seconds = prepared_seconds;
+        return c;
     }
     const std::string& method() const { return shown.method; }
-    std::string name() const { return IntegratorSpec::parse(method()).name; }
-    bool reuses_light_paths() const { return candidate_method(method()).reuses_light_paths; }
-    bool has_chains() const { return candidate_method(method()).has_chains; }
-    /// Pilots with chains are too few to tell what a guide gains there.
-    bool can_have_guide() const {
-        return !has_chains() && !guide && integrator_entry(name()).info.has_param("guide");
+    const std::string& name() const { return spec.name; }
+    bool reuses_light_paths() const { return candidate_method(name()).reuses_light_paths; }
+    bool has_chains() const { return candidate_method(name()).has_chains; }
+    IntegratorParams params() const { return {spec, integrator_entry(name()).info}; }
+    bool may_have_guide() const {
+        const IntegratorParams p = params();
+        // Chains by user paths have none.
+        return !has_tried_guide && p.has("guide") &&
+               !(p.has("user_paths") && !p.string("user_paths").empty());
     }
+    /// Of each kind, that train the guide of the rendering.
+    uint64_t walks_of_training() const { return uint64_t(params().integer("guide_walks")); }
     bool decides_on_specular(const Scene& scene) const {
         return scene.may_have_chains() &&
                integrator_entry(name()).info.has_param("specular_connections");
+    }
+    /// What renders its pilots.
+    IntegratorSpec pilot_spec() const {
+        IntegratorSpec small = spec;
+        // Chains have few states in pilots, and need as many for each as in the rendering. Of the groups, two suffice.
+        if (has_chains()) small.params["groups"] = "2", small.params["chains"] = "16";
+        small.guide = guide;
+        return small;
     }
     /// Simulated seconds of pilots on a film of so many pixels, where it has had one already.
     double pilot_seconds(double pixels) const {
@@ -97,79 +121,74 @@ struct Contender {
     }
 };
 
-/// Those that may take part, in the order in which they are tried.
-std::vector<Contender> contenders(const Scene& scene, const IntegratorParams& asked, int ranks) {
-    // Chains have few states in pilots, and need as many for each as in the rendering. Of the groups, two suffice.
-    constexpr const char* kChains = ":groups=2,chains=16";
+/// Among what pilots choose.
+struct Question {
+    std::vector<Contender> contenders;  ///< Without guides, in the order in which they are tried.
+    IntegratorSpec without_pilots;      ///< What renders where nothing can be said.
+    int threads = 1;                    ///< See threads_of_auto().
+    PilotShare share;                   ///< Of the rendering, for pilots.
+    double share_of_guides;             ///< See kShareOfGuides.
+};
+
+/// A spec as choose_integrator() makes it of the same text, with the parameters of `auto` that the method has, too.
+IntegratorSpec spec_for_auto(const Scene& scene, const IntegratorParams& asked,
+                             const std::string& method) {
+    IntegratorSpec spec = choose_integrator(scene, method);
+    const std::string& depth = asked.string("max_depth");
+    if (const std::string& of_scene = spec.params["max_depth"];
+        depth == kNoLimit && (of_scene.empty() || of_scene == kNoLimit))
+        spec.params.erase("max_depth");
+    else
+        spec.params["max_depth"] = depth;
+    if (spec.name == "mlt" && !asked.string("user_paths").empty())
+        spec.params["user_paths"] = asked.string("user_paths");
+    // Pilots decide, and not the scene.
+    if (spec.params.contains("guide")) spec.params["guide"] = "off";
+    return spec;
+}
+
+Question question_of_auto(const Scene& scene, const IntegratorSpec& integrator, int ranks) {
     constexpr int kShortestOfChains = 3;
+    const IntegratorParams asked(integrator, auto_entry().info);
     const int max_depth = asked.integer("max_depth");
     const bool may_have_chains =
         asked.flag("chains") && ranks == 1 && (max_depth < 0 || max_depth >= kShortestOfChains);
     const auto may_be = [&](const CandidateMethod& m) {
         const std::string_view name = m.name;
+        if (!m.is_of_auto) return false;
         // What light of emitters without extent reaches by way of mirrors and glass, eye paths never find.
         if (name == "path") return !scene.has_delta_emitters();
         if (name == "vcm") return asked.flag("consistent");
         return !m.has_chains || may_have_chains;
     };
-    std::vector<Contender> all;
+    Question q{.contenders = {},
+               .without_pilots = spec_for_auto(scene, asked, kWithoutPilots),
+               .threads = threads_of_auto(asked),
+               .share = kShareOfAuto,
+               .share_of_guides = kShareOfGuides};
     for (const CandidateMethod& m : kCandidateMethods)
-        if (may_be(m)) all.push_back(Contender::of(m.name, m.has_chains ? kChains : ""));
-    return all;
+        if (may_be(m)) q.contenders.push_back(Contender::of(spec_for_auto(scene, asked, m.name)));
+    return q;
 }
 
-/// Simulated seconds: of the rendering, and of the pilots, which may take a small part of it.
-class Budget {
-public:
-    Budget(const RenderLimits& limits, int threads, double pixels, double sample_seconds)
-        : limits_(limits), pixels_(pixels), sample_seconds_(sample_seconds) {
-        if (limits_.seconds) *limits_.seconds *= threads;
-    }
-
-    /// Of the rendering: what the first limit takes that is reached.
-    double seconds() const {
-        double seconds = std::numeric_limits<double>::infinity();
-        if (limits_.spp) seconds = double(*limits_.spp) * pixels_ * sample_seconds_;
-        if (limits_.seconds) seconds = std::min(seconds, *limits_.seconds);
-        if (limits_.error)
-            seconds = std::min(seconds, error_seconds_.value_or(plausible_error_seconds()));
-        return std::isfinite(seconds) ? seconds : kUnlimitedSeconds;
-    }
-    std::optional<double> error() const { return limits_.error; }
-    /// What a sample of the cheapest method takes.
-    void set_sample_seconds(double seconds) { sample_seconds_ = seconds; }
-    /// The time in which the best method reaches error(): no more than that can be saved.
-    void set_error_seconds(double seconds) { error_seconds_ = seconds; }
-
-    bool can_spend(double seconds) const {
-        return spent_ + seconds <= kPlannedShare * this->seconds();
-    }
-    /// What pilots may take at most.
-    double left() const { return std::max(0.0, kShare * seconds() - spent_); }
-    /// Whether it would be a small part of the rendering.
-    static bool is_small(double seconds, double of) { return seconds <= kShare * of; }
-    void spend(double seconds) { spent_ += seconds; }
-    double spent() const { return spent_; }
-
-private:
-    double plausible_error_seconds() const {
-        return std::max(1.0, kPlausibleError / sqr(*limits_.error)) * pixels_ * sample_seconds_;
-    }
-
-    RenderLimits limits_;
-    double pixels_, sample_seconds_;
-    std::optional<double> error_seconds_;
-    double spent_ = 0;
-};
+/// Whether a method is better with its guide.
+Question question_of_guide(IntegratorSpec integrator) {
+    make_integrator(integrator);  // throws if the parameters are wrong
+    integrator.params["guide"] = "off";
+    return {.contenders = {Contender::of(integrator)},
+            .without_pilots = integrator,
+            .share = kShareOfGuideChoice,
+            .share_of_guides = 1};
+}
 
 class Choosing {
 public:
-    Choosing(const Scene& scene, const RenderSettings& settings, const std::atomic<bool>& drop)
-        : scene_(scene), drop_(drop), settings_(settings),
-          asked_(settings.integrator, auto_entry().info),
-          budget_(settings, threads_of_auto(asked_), whole_pixels(),
-                  typical_sample_seconds("path")),
-          contenders_(contenders(scene, asked_, settings.ranks->count())) {
+    Choosing(const Scene& scene, const RenderSettings& settings, const std::atomic<bool>& drop,
+             Question question)
+        : scene_(scene), drop_(drop), settings_(settings), question_(std::move(question)),
+          budget_(settings, question_.threads, question_.share, whole_pixels(),
+                  typical_sample_seconds(question_.contenders.front().name())),
+          contenders_(question_.contenders) {
         settings_.choice = nullptr;
         settings_.first_pass = 0;
         settings_.technique_depth = 0;
@@ -188,12 +207,12 @@ public:
             if (contenders_.size() < 2 && !may_add_guides()) break;
             if (!(is_first ? has_time_for_two(pixels) : has_time_for_all(pixels))) break;
             if (!is_first) add_guides(pixels);
-            if (contenders_.size() < 2) break;
+            if (!is_first && contenders_.size() < 2) break;
             if (!try_all(pixels, is_first) || contenders_.empty()) break;
             drop_hopeless();
         }
         MethodChoice choice;
-        choice.asked = with_all_params(settings_.integrator);
+        choice.asked = asked_text(settings_.integrator);
         choice.candidates = candidates();
         // Where no pilot has met light with noise, all are equal, unless some have met light and others have not.
         const bool has_seen_noise =
@@ -203,12 +222,12 @@ public:
             !contenders_.empty() && contenders_.front().has_light != contenders_.back().has_light;
         // Alone, a method shows neither what it lacks nor whether another one is better.
         const bool is_compared = contenders_.size() + dropped_.size() > 1 || untried_.empty();
-        const std::string best = !contenders_.empty() && is_compared && (has_seen_noise || differs)
-                                     ? contenders_.front().method()
-                                     : kWithoutPilots;
+        const Contender best = !contenders_.empty() && is_compared && (has_seen_noise || differs)
+                                   ? contenders_.front()
+                                   : Contender::of(question_.without_pilots);
         std::stable_partition(choice.candidates.begin(), choice.candidates.end(),
-                              [&](const auto& k) { return k.method == best; });
-        choice.chosen = spec_of(best).to_string();
+                              [&](const auto& k) { return k.method == best.method(); });
+        choice.chosen = best.spec.to_string();
         choice.budget = budget_.seconds();
         choice.pilots = budget_.spent();
         choice.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
@@ -217,20 +236,6 @@ public:
 
 private:
     double whole_pixels() const { return double(scene_.film().pixel_count()); }
-
-    /// A spec as choose_integrator() makes it of the same text, with the parameters of `auto` that the method has, too.
-    IntegratorSpec spec_of(const std::string& method) const {
-        IntegratorSpec spec = choose_integrator(scene_, method);
-        const std::string& depth = asked_.string("max_depth");
-        if (const std::string& of_scene = spec.params["max_depth"];
-            depth == kNoLimit && (of_scene.empty() || of_scene == kNoLimit))
-            spec.params.erase("max_depth");
-        else
-            spec.params["max_depth"] = depth;
-        if (spec.name == "mlt" && !asked_.string("user_paths").empty())
-            spec.params["user_paths"] = asked_.string("user_paths");
-        return spec;
-    }
 
     std::vector<MethodChoice::Candidate> candidates() const {
         std::vector<MethodChoice::Candidate> all;
@@ -258,10 +263,12 @@ private:
         return double(width) * double(height);
     }
 
-    /// For pilots of the two cheapest contenders.
+    /// For pilots of the two cheapest contenders, if there are so many.
     bool has_time_for_two(double pixels) const {
-        const double each = pixels_of(pixels);
-        return budget_.can_spend(cost_of(contenders_[0], each) + cost_of(contenders_[1], each));
+        double cost = 0;
+        for (size_t i = 0; i < std::min<size_t>(2, contenders_.size()); ++i)
+            cost += cost_of(contenders_[i], pixels_of(pixels));
+        return budget_.can_spend(cost);
     }
     double cost_of_all(double pixels) const {
         double all = 0;
@@ -307,10 +314,10 @@ private:
             }
             c.prepared_seconds += c.pilot.prepared_seconds;
             // Chains that have found nothing make direct light alone, and seem cheap.
-            if (is_first && !c.has_chains() &&
+            if (is_first && (!c.has_chains() || contenders_.size() == 1) &&
                 (cheapest_ == 0 || c.pilot.pass_seconds < cheapest_ * each)) {
                 cheapest_ = c.pilot.pass_seconds / each;
-                cheapest_method_ = c.method();
+                cheapest_method_ = c.name();
                 budget_.set_sample_seconds(cheapest_);
             }
             tried.push_back(std::move(c));
@@ -323,8 +330,7 @@ private:
 
     MethodPilot pilot_of(const Scene& small, const Contender& c, double most) {
         RenderSettings settings = settings_;
-        settings.integrator = spec_of(c.in_pilots);
-        settings.integrator.guide = c.guide;
+        settings.integrator = c.pilot_spec();
         settings.integrator.shared_by_pilots = shared_by_pilots_;
         const MethodPilot pilot = render_pilot(small, settings, number_, most, drop_);
         number_ += kPilotReplicates;
@@ -424,7 +430,16 @@ private:
                          c.has_chains() ? std::min(whole_pixels(), kMostSamples) : whole_pixels(),
                      first = c.pilot.start_seconds * std::max(1.0, begun / pixels);
         return first + c.prepared_seconds + (is_specular(c) ? specular_photon_seconds() : 0) +
-               (c.guide ? training_seconds(walks_of_training()) : 0);
+               (c.guide ? guide_seconds(c) : 0);
+    }
+    /// Of the training before the first pass of the rendering, and of the refits later; see Guiding::train().
+    double guide_seconds(const Contender& c) const {
+        const auto walks = double(c.walks_of_training());
+        const double samples = budget_.seconds() / std::max(c.shown.sample_seconds, 1e-12),
+                     refits = c.has_chains() || !c.guide->guides_surfaces()
+                                  ? 0
+                                  : std::floor(std::log2(std::max(1.0, samples / walks)) / 3);
+        return (1 + refits) * training_seconds(c.walks_of_training());
     }
     /// Whether specular connections of a method with light paths make light that chains hardly find. Pilots of chains that lack
     /// it agree, as if nothing were missing.
@@ -451,48 +466,60 @@ private:
         }
     }
 
-    /// Whether guides may still help. Their training for the rendering itself must be a small part of it.
+    /// Whether a guide may still help. Its training for the rendering itself must be a small part of it.
+    bool may_add_guide(const Contender& c) const {
+        return c.may_have_guide() &&
+               Budget::is_small(training_seconds(c.walks_of_training()), budget_.seconds());
+    }
     bool may_add_guides() const {
-        return !has_tried_guides_ &&
-               Budget::is_small(training_seconds(walks_of_training()), budget_.seconds()) &&
-               std::any_of(contenders_.begin(), contenders_.end(),
-                           [](const Contender& c) { return c.can_have_guide(); });
+        return std::any_of(contenders_.begin(), contenders_.end(),
+                           [&](const Contender& c) { return may_add_guide(c); });
     }
 
     /// Trains guides for the contenders that can have one, the best first, as far as there is time for them and for all pilots
-    /// on a film of so many pixels. Adds those that `guide=auto` would keep.
+    /// on a film of so many pixels. Adds those that may gain something.
     void add_guides(double pixels) {
-        if (!may_add_guides()) return;
-        const double training = training_seconds(kWalksOfPilot);
-        double pilots = cost_of_all(pixels);
+        double pilots = cost_of_all(pixels), left = question_.share_of_guides * budget_.planned();
+        const uint64_t affordable = walks_of_pilot(left);
         std::vector<Contender> more;
-        for (const Contender& c : contenders_) {
-            const double guided = guided_factor(true) * cost_of(c, pixels_of(pixels));
-            if (!c.can_have_guide() || !budget_.can_spend(training + pilots + guided)) continue;
-            has_tried_guides_ = true;
+        for (Contender& c : contenders_) {
+            if (!may_add_guide(c)) continue;
+            const uint64_t walks = std::min(affordable, c.walks_of_training());
+            const double training = training_seconds(walks),
+                         guided = guided_factor(true) * cost_of(c, pixels_of(pixels));
+            if (training + guided > left || !budget_.can_spend(training + pilots + guided))
+                continue;
+            c.has_tried_guide = true;
             budget_.spend(training);
-            const auto guide = trained_guide(c);
+            left -= training;
+            const auto guide = trained_guide(c, walks);
             if (!guide) continue;
             pilots += guided;
-            more.push_back(Contender::of(c.method() + ":guide=auto"));
-            more.back().in_pilots = c.method() + ":guide=on";
-            more.back().guide = guide;
-            more.back().unguided = c.method();
-            more.back().prepared_seconds = c.prepared_seconds;
+            left -= guided;
+            more.push_back(c.guided_by(guide));
         }
         contenders_.insert(contenders_.end(), more.begin(), more.end());
     }
 
-    /// nullptr if it would not be kept.
-    std::shared_ptr<const Guide> trained_guide(const Contender& c) {
-        IntegratorSpec spec = spec_of(c.method());
-        spec.params["guide_walks"] = std::to_string(kWalksOfPilot);
+    /// As many as there is time for, if all contenders get a guide that may have one.
+    uint64_t walks_of_pilot(double time_of_guides) const {
+        const auto guides =
+            double(std::count_if(contenders_.begin(), contenders_.end(),
+                                 [&](const Contender& c) { return may_add_guide(c); }));
+        const double each = kShareOfTraining * time_of_guides / std::max(1.0, guides);
+        return std::max(kLeastWalks, uint64_t(each / training_seconds(1)));
+    }
+
+    /// nullptr if it gains nothing.
+    std::shared_ptr<const Guide> trained_guide(const Contender& c, uint64_t walks) {
+        IntegratorSpec spec = c.spec;
+        spec.params["guide_walks"] = std::to_string(walks);
         try {
             const LearnedGuide learned(scene_, spec,
                                        pilot_seed(settings_.seed, PilotUse::Choice, number_++),
                                        settings_.threads);
             if (drop_.load()) throw PassDropped();
-            if (learned.is_kept_by_auto()) return std::make_shared<const Guide>(learned.guide());
+            if (learned.may_gain()) return std::make_shared<const Guide>(learned.guide());
         } catch (const NothingToLearn&) {
         }
         return nullptr;
@@ -501,7 +528,7 @@ private:
     const Scene& scene_;
     const std::atomic<bool>& drop_;
     RenderSettings settings_;
-    IntegratorParams asked_;
+    Question question_;
     Budget budget_;
     std::vector<Contender> contenders_;  ///< The best first, once there are pilots.
     std::vector<MethodChoice::Candidate> dropped_, untried_;
@@ -509,26 +536,32 @@ private:
     std::string cheapest_method_;
     double pixels_before_ = 0;  ///< Of the film of the last pilots.
     uint64_t number_ = 0;       ///< Of the next pilot.
-    bool has_tried_guides_ = false;
     const std::shared_ptr<SharedByPilots> shared_by_pilots_ = std::make_shared<SharedByPilots>();
 };
 
 }  // namespace
 
+bool is_chosen_by_pilots(const IntegratorSpec& spec) {
+    return is_auto(spec) || has_guide_by_pilots(spec);
+}
+
 RenderSettings with_chosen_method(const Scene& scene, const RenderSettings& settings,
                                   const std::atomic<bool>& drop) {
-    if (!is_auto(settings.integrator)) return settings;
+    if (!is_chosen_by_pilots(settings.integrator)) return settings;
     RenderSettings chosen = settings;
-    const auto choice =
-        std::make_shared<const MethodChoice>(Choosing(scene, settings, drop).choose());
+    Question question = is_auto(settings.integrator)
+                            ? question_of_auto(scene, settings.integrator, settings.ranks->count())
+                            : question_of_guide(settings.integrator);
+    const auto choice = std::make_shared<const MethodChoice>(
+        Choosing(scene, settings, drop, std::move(question)).choose());
     chosen.integrator = IntegratorSpec::parse(choice->chosen);
     chosen.choice = choice;
     return chosen;
 }
 
 RenderSettings with_chosen_method(const RenderSettings& settings, const MethodChoice& earlier) {
-    if (!is_auto(settings.integrator)) return settings;
-    if (const std::string asked = as_utf8(with_all_params(settings.integrator));
+    if (!is_chosen_by_pilots(settings.integrator)) return settings;
+    if (const std::string asked = as_utf8(asked_text(settings.integrator));
         asked != as_utf8(earlier.asked))
         throw std::runtime_error(fmt::format(
             "the method was chosen by \"{}\" there, but it is to be chosen by \"{}\" here",

@@ -1,5 +1,6 @@
 #pragma once
-// `auto`: pilots on a small film choose the method of a rendering. See docs/integrators/auto.md.
+// `auto` and `guide=auto`: pilots on a small film choose the method of a rendering, or whether its walks are guided. See
+// docs/integrators/auto.md.
 
 #include <atomic>
 #include <string>
@@ -13,7 +14,7 @@ namespace etendue {
 
 /// What was chosen, and why. Simulated seconds are those of cost_table.h.
 struct MethodChoice {
-    std::string asked;   ///< The integrator that was asked for: `auto`, with all its parameters.
+    std::string asked;   ///< The integrator that was asked for; `auto` has all its parameters.
     std::string chosen;  ///< The integrator that renders.
     struct Candidate {
         std::string method;
@@ -42,7 +43,10 @@ struct MethodChoice {
 
 inline const std::atomic<bool> kNeverDrop{false};
 
-/// The same settings. If their integrator is `auto`, it is replaced by a method that pilots choose, and `choice` is set.
+/// Whether it is `auto`, or a method with `guide=auto`.
+bool is_chosen_by_pilots(const IntegratorSpec& spec);
+
+/// The same settings. If pilots choose their integrator, it is replaced by what they choose, and `choice` is set.
 ///
 /// The method is a function of the scene, the seed, the limits and the other settings that decide the image, but not of
 /// the number of threads, the first pass, or any clock. Where several processes render together, chains are no candidates;

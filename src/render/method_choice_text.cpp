@@ -10,14 +10,15 @@
 namespace etendue {
 
 std::string MethodChoice::message() const {
+    const char* const by = asked.find("guide=auto") != std::string::npos ? "guide=auto" : "auto";
     if (candidates.empty() || candidates.front().images == 0)
         return pilots > 0
-                   ? fmt::format("auto: {}, since pilots would take too much of the time (those "
+                   ? fmt::format("{}: {}, since pilots would take too much of the time (those "
                                  "that were stopped: {:.1f} s)",
-                                 chosen, seconds)
-                   : fmt::format("auto: {}, without pilots, which would take too much of the time",
-                                 chosen);
-    std::string text = fmt::format("auto: {}", chosen);
+                                 by, chosen, seconds)
+                   : fmt::format("{}: {}, without pilots, which would take too much of the time",
+                                 by, chosen);
+    std::string text = fmt::format("{}: {}", by, chosen);
     // Errors on other films are not comparable, and a black film has none.
     if (candidates.size() > 1 && candidates[1].pixels == candidates[0].pixels &&
         candidates[1].error() > 0)

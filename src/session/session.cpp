@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 
 #include "film/thread_arena.h"
-#include "integrator/auto.h"
 #include "render/method_choice.h"
 #include "render/render_report.h"
 #include "render/render_request.h"
@@ -250,7 +249,7 @@ void Session::make_renderer(Run& run) {
     run.error = {};
     run.settings.seed = run.status.request.seed + uint64_t(run.seeds.count());
     std::unique_ptr<Integrator> integrator = std::move(run.integrator);
-    if (is_auto(run.settings.integrator)) integrator = chosen_method(run);
+    if (is_chosen_by_pilots(run.settings.integrator)) integrator = chosen_method(run);
     if (!integrator) integrator = make_integrator(run.settings.integrator);
     RenderSettings own = run.settings;
     // The pilots of a series are part of the time of its first seed.

@@ -7,7 +7,6 @@
 
 #include <fmt/format.h>
 
-#include "integrator/auto.h"
 #include "render/method_choice.h"
 #include "render/warnings.h"
 #include "system/failure.h"
@@ -413,7 +412,7 @@ std::vector<IntegratorSpec> with_long_chains(const std::vector<IntegratorSpec>& 
 /// What renders: of `auto`, the method that it chooses.
 IntegratorSpec rendering_method(const Scene& scene, const IntegratorSpec& method,
                                 const VerifyOptions& options) {
-    if (!is_auto(method)) return method;
+    if (!is_chosen_by_pilots(method)) return method;
     RenderSettings settings;
     settings.integrator = limited(method, options.longest);
     settings.sampler = options.sampler;

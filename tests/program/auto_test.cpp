@@ -133,6 +133,11 @@ TEST_F(AutoTest, InfoShowsTheChoice) {
     // Where pilots would take too long, too.
     EXPECT_NE(info({"--spp", "1"}).output.find("no pilot"), std::string::npos);
 
+    // Of a guide.
+    const ProgramResult guide = info({"-i", "path:guide=auto,guide_walks=20000", "--spp", "3000"});
+    EXPECT_EQ(guide.status, 0) << guide.errors;
+    EXPECT_NE(guide.output.find("    path:guide=on "), std::string::npos) << guide.output;
+
     const auto expect_refusal = [&](const ProgramResult& refused, const std::string& message) {
         EXPECT_EQ(refused.status, 2);
         EXPECT_EQ(refused.output, "");

@@ -84,20 +84,18 @@ TEST_P(Determinism, OfThreadsAndSeeds) {
 INSTANTIATE_TEST_SUITE_P(
     Integrators, Determinism,
     ::testing::Combine(
-        ::testing::Values("path", "light", "bdpt", "bdpt:eorr=true", "pcbpt", "vcm",
-                          "vcm:exact=true", "upg+bdpt", "path:specular_connections=on",
-                          "upg+bdpt:specular_connections=auto",
-                          "path:guide=on,guide_roulette=false,guide_walks=3000",
-                          "bdpt:guide=hp02,guide_walks=3000", "upg+bdpt:guide=on,guide_walks=3000",
-                          "sppm", "ppm:eye_paths=2", "pm:light_paths=2000",
-                          "pm:light_paths=2000,cache_error=0.3,cache_rays=32",
-                          "pssmlt:groups=2,chains=24", "mmlt:groups=2,chains=48",
-                          "mlt:groups=2,chains=48",
-                          "mmlt:groups=2,chains=48,guide=on,guide_walks=3000",
-                          "mlt:groups=2,chains=48,guide=on,guide_walks=3000",
-                          "pssmlt:groups=2,chains=24,guide=auto,guide_walks=3000",
-                          "upg+pssmlt:groups=2,chains=24", "mps:mutations=2000,precision=0.2",
-                          "mps:target=path,mutations=1000,precision=0.2"),
+        ::testing::Values(
+            "path", "light", "bdpt", "bdpt:eorr=true", "pcbpt", "vcm", "vcm:exact=true", "upg+bdpt",
+            "path:specular_connections=on", "upg+bdpt:specular_connections=auto",
+            "path:guide=on,guide_roulette=false,guide_walks=3000",
+            "bdpt:guide=hp02,guide_walks=3000", "upg+bdpt:guide=on,guide_walks=3000", "sppm",
+            "ppm:eye_paths=2", "pm:light_paths=2000",
+            "pm:light_paths=2000,cache_error=0.3,cache_rays=32", "pssmlt:groups=2,chains=24",
+            "mmlt:groups=2,chains=48", "mlt:groups=2,chains=48",
+            "mmlt:groups=2,chains=48,guide=on,guide_walks=3000",
+            "mlt:groups=2,chains=48,guide=on,guide_walks=3000",
+            "pssmlt:groups=2,chains=24,guide=on,guide_walks=3000", "upg+pssmlt:groups=2,chains=24",
+            "mps:mutations=2000,precision=0.2", "mps:target=path,mutations=1000,precision=0.2"),
         ::testing::ValuesIn(kSamplers)),
     [](const auto& p) {
         std::string name = std::get<0>(p.param);

@@ -230,6 +230,25 @@ TEST(Checkpoint, PassesWithoutLightVerticesAreRemembered) {
         }
 }
 
+/// A rendering that goes on has no pilots, and the same bits.
+TEST(Checkpoint, HasTheChoiceOfAGuide) {
+    const Scene scene = build(front_camera(56) + room() + area_lamp());
+    const Renderings renderings(scene);
+    RenderSettings settings = settings_of("path:guide=auto");
+    settings.spp = 4000;
+    const RenderSettings chosen = with_chosen_method(scene, settings);
+    ASSERT_TRUE(chosen.choice);
+    EXPECT_GT(chosen.choice->candidates.front().images, 0);
+    EXPECT_EQ(chosen.choice->candidates.size(), 2u);
+    Renderer whole(scene, chosen);
+    PassLog log;
+    renderings.run(whole, 5, log);
+    renderings.render("a", chosen, 2);
+    const auto read = MethodChoice::from_json(CheckpointFile(renderings.file("a")).header().choice);
+    settings.spp = 5;  // too few for pilots
+    expect_equal(renderings.resume("a", with_chosen_method(settings, read), 5), Outcome(whole));
+}
+
 /// A checkpoint that is written after such a failure must have them, too.
 TEST(Checkpoint, ChainsThatCannotBeLoadedAreKept) {
     const Scene scene = build(mixed_room(lens_camera(16)));

@@ -167,6 +167,124 @@ TEST(MethodChoice, TheChosenTextGivesTheSameBits) {
         }
 }
 
+/// Methods whose walks and chains are guided.
+TEST(MethodChoice, HasCandidatesWithGuides) {
+    const Scene scene = scene_of_project("ring.xml", 160, 120);
+    int guided = 0, guided_chains = 0;
+    constexpr double kSeconds = 100;
+    const MethodChoice choice = choice_of(scene, "auto", kSeconds);
+    EXPECT_LE(choice.pilots, 0.08 * kSeconds);
+    for (const auto& k : choice.candidates)
+        if (k.method.find(":guide=on") != std::string::npos && k.images > 0) {
+            ++guided;
+            guided_chains += candidate_method(k.method).has_chains;
+            // The training is booked.
+            EXPECT_GE(k.start_seconds, training_seconds(100000));
+        }
+    EXPECT_GT(guided, 1);
+    EXPECT_GT(guided_chains, 0);
+    // Where the training of the rendering would take a large part of it, there are none.
+    for (const auto& k : choice_of(scene, "auto", 8).candidates)
+        EXPECT_EQ(k.method.find(":guide"), std::string::npos) << k.method;
+}
+
+TEST(GuideChoice, IsSensible) {
+    const auto chosen = [](const std::string& scene, const std::string& method) {
+        const MethodChoice c = choice_of(scene_of_project(scene, 240, 180), method, 60);
+        return IntegratorSpec::parse(c.chosen).params.at("guide");
+    };
+    EXPECT_EQ(chosen("lantern.xml", "path:guide=auto"), "on");
+    EXPECT_EQ(chosen("cornell.xml", "bdpt:guide=auto"), "off");
+}
+
+/// For each method, also where the parameters name it.
+TEST(GuideChoice, ExistsForEachMethodThatHasAGuide) {
+    const Scene scene = scene_of_project("ring.xml", 64, 48);
+    for (const IntegratorEntry& entry : integrator_registry()) {
+        if (!entry.info.has_param("guide")) continue;
+        const std::string name = entry.info.name;
+        SCOPED_TRACE(name);
+        const MethodChoice c =
+            choice_of(scene, name + ":guide=auto,guide_walks=20000,max_depth=5", 30);
+        EXPECT_EQ(methods_of(c), (std::vector{name, name + ":guide=on"}));
+        EXPECT_EQ(c.asked, name + ":guide=auto,guide_walks=20000,max_depth=5");
+        EXPECT_TRUE(c.chosen == name + ":guide=off,guide_walks=20000,max_depth=5" ||
+                    c.chosen == name + ":guide=on,guide_walks=20000,max_depth=5")
+            << c.chosen;
+        EXPECT_LE(c.pilots, 0.04 * 30);
+        for (const auto& k : c.candidates) EXPECT_GT(k.images, 0);
+        EXPECT_EQ(c.message().rfind("guide=auto: ", 0), 0u);
+    }
+    EXPECT_FALSE(is_chosen_by_pilots(IntegratorSpec::parse("bdpt:guide=on")));
+    EXPECT_NE(error_of([&] { choice_of(scene, "bdpt:guide=auto,depth=4"); }).find("max_depth"),
+              std::string::npos);
+}
+
+TEST(GuideChoice, IsAFunctionOfSceneSeedAndBudget) {
+    const Scene scene = scene_of_project("ring.xml", 160, 120);
+    RenderSettings settings = settings_of(scene, "pcbpt:guide=auto", 30);
+    const auto text = [&] {
+        MethodChoice c = *with_chosen_method(scene, settings).choice;
+        EXPECT_GT(c.candidates.back().images, 0);
+        c.seconds = 0;
+        return c.to_json().dump();
+    };
+    const std::string first = text();
+    for (const int threads : {1, 3}) {
+        settings.threads = threads;
+        EXPECT_EQ(text(), first);
+    }
+    settings.seed = 1;
+    EXPECT_NE(text(), first);
+}
+
+TEST(GuideChoice, TheChosenTextGivesTheSameBits) {
+    const Scene lantern = scene_of_project("lantern.xml", 96, 72),
+                asked_by_scene = build(front_camera(72) + room() + area_lamp() +
+                                       "<integrator type=\"bdpt\"><string name=\"guide\" "
+                                       "value=\"auto\"/></integrator>");
+    for (const auto& [scene, asked] :
+         {std::pair{&lantern, "bdpt:guide=auto"}, {&asked_by_scene, ""}}) {
+        RenderSettings settings = settings_of(*scene, asked, 1e9);
+        settings.spp = 4000;
+        const auto automatic = rendered(*scene, settings);
+        const auto choice = automatic->settings().choice;
+        ASSERT_TRUE(choice);
+        SCOPED_TRACE(choice->chosen);
+        EXPECT_GT(choice->candidates.front().images, 0);
+        settings.integrator = choose_integrator(*scene, choice->chosen);
+        const auto given = rendered(*scene, settings);
+        EXPECT_FALSE(given->settings().choice);
+        EXPECT_TRUE(automatic->film().image() == given->film().image());
+        // A rendering that goes on has it, too.
+        settings.integrator = choose_integrator(*scene, asked);
+        EXPECT_EQ(with_chosen_method(settings, *choice).integrator.to_string(), choice->chosen);
+        settings.integrator = IntegratorSpec::parse("path:guide=auto");
+        EXPECT_NE(error_of([&] { with_chosen_method(settings, *choice); }).find("path"),
+                  std::string::npos);
+    }
+}
+
+/// Nothing is trained for renderings that it would make much longer.
+TEST(GuideChoice, ShortRenderingsHaveNoPilots) {
+    const Scene scene = scene_of_project("lantern.xml", 240, 180);
+    for (const char* method : {"path:guide=auto", "bdpt:guide=auto", "mlt:guide=auto"}) {
+        SCOPED_TRACE(method);
+        RenderSettings settings = settings_of(scene, method, 1);
+        const auto expect_none = [&] {
+            const MethodChoice c = *with_chosen_method(scene, settings).choice;
+            EXPECT_EQ(c.pilots, 0);
+            EXPECT_NE(c.chosen.find("guide=off"), std::string::npos);
+        };
+        expect_none();
+        settings.seconds = {};
+        settings.spp = 4;
+        expect_none();
+        for (const double seconds : {10.0, 20.0, 40.0})
+            EXPECT_LE(choice_of(scene, method, seconds).pilots, 0.04 * seconds);
+    }
+}
+
 /// Chains cannot be shared.
 TEST(MethodChoice, ProcessesThatRenderTogetherChooseTheSameWithoutChains) {
     const Scene scene = scene_of_project("ring.xml", 48, 36);
@@ -285,17 +403,22 @@ TEST(Candidates, AreWhatTheirIntegratorsAre) {
     for (const CandidateMethod& m : kCandidateMethods) {
         SCOPED_TRACE(m.name);
         EXPECT_GT(typical_sample_seconds(m.name), 0);
-        for (const std::string guide : {"off", "auto"}) {
+        for (const std::string guide : {"off", "on"}) {
             const std::string method = fmt::format("{}:guide={}", m.name, guide);
             const auto integrator = make_integrator(IntegratorSpec::parse(method));
             EXPECT_EQ(candidate_method(method).name, m.name);
             EXPECT_EQ(candidate_method(method).has_chains, integrator->error_groups() > 0);
             const std::string name = m.name;
             EXPECT_EQ(candidate_method(method).reuses_light_paths,
-                      name == "vcm" || name == "upg+bdpt");
+                      name == "vcm" || name == "upg+bdpt" || name == "upg");
         }
     }
-    EXPECT_THROW(candidate_method("upg"), std::logic_error);
+    EXPECT_THROW(candidate_method("sppm"), std::logic_error);
+    // Pilots can judge the guide of each method that has one.
+    for (const IntegratorEntry& entry : integrator_registry())
+        if (entry.info.has_param("guide")) {
+            EXPECT_EQ(candidate_method(entry.info.name).name, std::string(entry.info.name));
+        }
 }
 
 /// What is rendered without a word about the method, also where there is little to render, or no light.
