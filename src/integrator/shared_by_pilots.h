@@ -15,8 +15,13 @@ namespace etendue {
 /// Not for two renderings at a time.
 struct SharedByPilots {
     std::shared_ptr<const SeedPhotons> photons;
-    std::map<std::string, SpecularPilot> specular;  ///< By method.
+    std::map<std::string, SpecularPilot> specular;  ///< By specular_pilot_name().
     std::optional<LightSelections> lights;          ///< Of next events.
 };
+
+/// With a guide, walks can find what otherwise connections find.
+inline std::string specular_pilot_name(const std::string& method, bool is_guided) {
+    return method + (is_guided ? ":guide=on" : "");
+}
 
 }  // namespace etendue

@@ -21,7 +21,7 @@ Specular::Specular(const IntegratorParams& p) {
     mode_ = p.choice("specular_connections", kModes);
     is_used_ = mode_ != Mode::Off;
     depth_ = p.integer("specular_depth", 1, ChainEvents::kMost);
-    method_ = p.integrator();
+    method_ = specular_pilot_name(p.integrator(), p.given_guide() != nullptr);
     pilots_ = p.shared_by_pilots();
 }
 

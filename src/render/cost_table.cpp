@@ -9,9 +9,9 @@ namespace {
 /// Costs of what is counted, in seconds; fitted by bench/method-costs.
 constexpr double kLightPath = 0.03e-6, kWalkRay = 0.36e-6, kShadowRay = 0.28e-6, kPair = 0.16e-6,
                  kTrialRay = 1.23e-6, kChainRay = 0.60e-6;
-/// The same counters cost so much more where directions at surfaces are guided: 1.3 to 1.9 times on six scenes. Where only
-/// emission is guided, they cost up to a fifth more.
-constexpr double kGuided = 1.6;
+/// The same counters cost so much more with a guide: where directions at surfaces are guided, 1.25 times (`bdpt`) to 1.9 times
+/// on six scenes, and otherwise 1.1 to 1.4 times.
+constexpr double kWithSurfaces = 1.5, kWithoutSurfaces = 1.15;
 
 struct MethodCost {
     const char* method;
@@ -25,9 +25,9 @@ constexpr std::array<MethodCost, 10> kMethodCosts{{{"path", 1.00, 1.5e-6},
                                                    {"vcm", 1.56, 4.0e-6},
                                                    {"mlt", 1.52, 8.0e-6},
                                                    {"mmlt", 0.98, 9.0e-6},
-                                                   {"light", 1.00, 1.5e-6},
-                                                   {"upg", 1.66, 7.0e-6},
-                                                   {"pssmlt", 1.00, 8.0e-6}}};
+                                                   {"light", 1.23, 1.7e-6},
+                                                   {"upg", 1.45, 6.0e-6},
+                                                   {"pssmlt", 1.37, 6.0e-6}}};
 
 const MethodCost& cost_of(const std::string& method) {
     for (const MethodCost& m : kMethodCosts)
@@ -37,12 +37,17 @@ const MethodCost& cost_of(const std::string& method) {
 
 }  // namespace
 
-double guided_factor(bool is_guided) {
-    return is_guided ? kGuided : 1.0;
+double guided_factor(GuideUse guide) {
+    switch (guide) {
+    case GuideUse::None: break;
+    case GuideUse::WithoutSurfaces: return kWithoutSurfaces;
+    case GuideUse::WithSurfaces: return kWithSurfaces;
+    }
+    return 1;
 }
 
-double simulated_seconds(const std::string& method, bool is_guided, const RenderStats& s) {
-    return cost_of(method).factor * guided_factor(is_guided) *
+double simulated_seconds(const std::string& method, GuideUse guide, const RenderStats& s) {
+    return cost_of(method).factor * guided_factor(guide) *
            (kLightPath * double(s.light_paths) + kWalkRay * double(s.walk_rays) +
             kShadowRay * double(s.shadow_rays) + kPair * double(s.pairs) +
             kTrialRay * double(s.trial_rays) + kChainRay * double(s.chain_rays));

@@ -7,12 +7,14 @@
 
 namespace etendue {
 
+/// What a guide does for a method. Without guided directions at surfaces, emission and Russian roulette remain.
+enum class GuideUse { None, WithoutSurfaces, WithSurfaces };
+
 /// Seconds that one thread of a usual machine takes for what `stats` has counted of a method, in a scene of middle size. In
 /// one scene, methods are to each other as these figures are, within about a fifth.
-/// `is_guided`: whether a guide chooses directions at surfaces.
-double simulated_seconds(const std::string& method, bool is_guided, const RenderStats& stats);
-/// Cost of a sample relative to one of the same method without guide.
-double guided_factor(bool is_guided);
+double simulated_seconds(const std::string& method, GuideUse guide, const RenderStats& stats);
+/// Cost of what the counters count, relative to the same without a guide.
+double guided_factor(GuideUse guide);
 /// The same for a sample of a method of which nothing is known yet.
 double typical_sample_seconds(const std::string& method);
 /// The same for the first decision about specular connections, see run_specular_pilot().

@@ -86,7 +86,6 @@ struct Contender {
         c.guide = std::move(trained);
         c.unguided = method();
         c.has_tried_guide = true;
-        c.prepared_seconds = prepared_seconds;
         return c;
     }
     const std::string& method() const { return shown.method; }
@@ -250,13 +249,21 @@ private:
         if (c.shown.images > 0) return c.pilot_seconds(pixels);
         if (!c.unguided.empty())
             for (const Contender& known : contenders_)
-                if (known.method() == c.unguided)
-                    return guided_factor(true) * known.pilot_seconds(pixels);
+                if (known.method() == c.unguided) return cost_with_guide(known, pixels);
         // Of the cheapest method it is known what a sample takes in this scene.
         const double slower =
             cheapest_ > 0 ? cheapest_ / typical_sample_seconds(cheapest_method_) : 1.0;
-        return (c.decides_on_specular(scene_) ? typical_specular_pilot_seconds() : 0) +
+        return decision_seconds(c) +
                kPilotReplicates * kPilotPasses * pixels * slower * typical_sample_seconds(c.name());
+    }
+    /// The same of the first pilots of a contender with a guide. `c` is without, and has had pilots.
+    double cost_with_guide(const Contender& c, double pixels) const {
+        return decision_seconds(c) +
+               guided_factor(GuideUse::WithSurfaces) * c.pilot_seconds(pixels);
+    }
+    /// Of the decision about specular connections.
+    double decision_seconds(const Contender& c) const {
+        return c.decides_on_specular(scene_) ? typical_specular_pilot_seconds() : 0;
     }
     double pixels_of(double pixels) const {
         const auto [width, height] = size_of_pilot(scene_.film(), pixels);
@@ -446,12 +453,13 @@ private:
     bool is_beyond_chains() const {
         const auto& pilots = shared_by_pilots_->specular;
         return std::any_of(pilots.begin(), pilots.end(), [](const auto& p) {
-            return p.first != "path" && p.second.is_beyond_chains();
+            return !p.first.starts_with("path") && p.second.is_beyond_chains();
         });
     }
     /// Whether the method has decided for specular connections.
     bool is_specular(const Contender& c) const {
-        const auto pilot = shared_by_pilots_->specular.find(c.name());
+        const auto pilot =
+            shared_by_pilots_->specular.find(specular_pilot_name(c.name(), c.guide != nullptr));
         return pilot != shared_by_pilots_->specular.end() && pilot->second.is_worthwhile();
     }
 
@@ -486,7 +494,7 @@ private:
             if (!may_add_guide(c)) continue;
             const uint64_t walks = std::min(affordable, c.walks_of_training());
             const double training = training_seconds(walks),
-                         guided = guided_factor(true) * cost_of(c, pixels_of(pixels));
+                         guided = cost_with_guide(c, pixels_of(pixels));
             if (training + guided > left || !budget_.can_spend(training + pilots + guided))
                 continue;
             c.has_tried_guide = true;

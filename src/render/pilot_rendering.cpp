@@ -57,13 +57,17 @@ private:
     std::vector<float> before_;
 };
 
+GuideUse use_of(const Guide* guide) {
+    if (!guide) return GuideUse::None;
+    return guide->guides_surfaces() ? GuideUse::WithSurfaces : GuideUse::WithoutSurfaces;
+}
+
 /// Renders replicate r of a pilot that must not take more than `most` simulated seconds.
 void add_replicate(const Scene& small, RenderSettings settings, uint64_t first, int r, double most,
                    const std::atomic<bool>& drop, MethodPilot& pilot) {
-    const Guide* guide = settings.integrator.guide.get();
     const auto cost = [method = settings.integrator.name,
-                       is_guided = guide && guide->guides_surfaces()](const RenderStats& stats) {
-        return simulated_seconds(method, is_guided, stats);
+                       use = use_of(settings.integrator.guide.get())](const RenderStats& stats) {
+        return simulated_seconds(method, use, stats);
     };
     settings.seed = pilot_seed(settings.seed, PilotUse::Choice, first + uint64_t(r));
     static_cast<RenderLimits&>(settings) = {.spp = kPilotPasses, .seconds = {}, .error = {}};

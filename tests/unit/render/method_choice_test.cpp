@@ -15,9 +15,11 @@
 
 #include "error_of.h"
 #include "integrator/auto.h"
+#include "integrator/shared_by_pilots.h"
 #include "math/statistics.h"
 #include "render/candidates.h"
 #include "render/cost_table.h"
+#include "render/learned_guide.h"
 #include "render/pilot_rendering.h"
 #include "render/render_request.h"
 #include "sampler/pilot_seed.h"
@@ -586,6 +588,23 @@ TEST(Pilots, BookWhatPrecedesTheFirstPass) {
     const Scene plain = build(front_camera(24) + room() + area_lamp());
     EXPECT_EQ(
         render_pilot(plain, settings_of(plain, "path", 1), 0, kNoLimit, never).prepared_seconds, 0);
+}
+
+/// A rendering with a guide decides with it about specular connections, and so do its pilots.
+TEST(Pilots, DecideOnSpecularConnectionsWithTheirGuides) {
+    const Scene scene = build(lantern_room(front_camera(24)));
+    const std::atomic<bool> never{false};
+    RenderSettings settings = settings_of(scene, "path", 1);
+    const auto shared = std::make_shared<SharedByPilots>();
+    settings.integrator.shared_by_pilots = shared;
+    render_pilot(scene, settings, 0, kNoLimit, never);
+    settings.integrator.params["guide"] = "on";
+    settings.integrator.guide = std::make_shared<const Guide>(
+        LearnedGuide(scene, choose_integrator(scene, "path:guide_walks=20000"), 1, 2).guide());
+    render_pilot(scene, settings, 1, kNoLimit, never);
+    ASSERT_EQ(shared->specular.size(), 2u);
+    EXPECT_NE(shared->specular.at("path").luminance,
+              shared->specular.at("path:guide=on").luminance);
 }
 
 /// Passes of a Sobol' sequence have less noise together than as many independent ones. Pilots see a part of that, since they
