@@ -67,8 +67,10 @@ void add_walk(const WalkContext& walk, int max_depth, const SeedPhotons& photons
             others += double(luminance(j->contribution) * j->mis_weight *
                              visibility(walk.scene, *j, work.stats));
         const uint64_t before = work.stats.chain_trials;
-        const SpecularLimits limits{
-            .max_depth = max_depth, .most_trials = kMostTrials, .photons = &photons};
+        const SpecularLimits limits{.max_depth = max_depth,
+                                    .most_trials = kMostTrials,
+                                    .gives_up = false,
+                                    .photons = &photons};
         const auto x = join_specular(walk.scene, z, t, limits, sampler, n, work);
         if (!x) continue;
         const double w = double(x->mis_weight), v = double(luminance(x->contribution)) * w;

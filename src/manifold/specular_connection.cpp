@@ -69,9 +69,10 @@ std::optional<Solution> evaluate(const Vertex& from, const LampPoint& lamp, Vec3
     return Solution{w, events, C * Tr, weight};
 }
 
-/// Number of seeds until one leads to the solution, at most `most`.
-uint64_t count_trials(const Solution& found, const LampPoint& lamp, ChainSeeds& seeds,
-                      ChainTracer& tracer, uint64_t most, Sampler& sampler, Workspace& work) {
+/// Number of seeds until one leads to the solution; empty where it is larger than `most`.
+std::optional<uint64_t> count_trials(const Solution& found, const LampPoint& lamp,
+                                     ChainSeeds& seeds, ChainTracer& tracer, uint64_t most,
+                                     Sampler& sampler, Workspace& work) {
     constexpr uint64_t kSeldom = 1024;
     for (uint64_t n = 1; n <= most; ++n) {
         if (n % kSeldom == 0) work.go_on();
@@ -81,8 +82,7 @@ uint64_t count_trials(const Solution& found, const LampPoint& lamp, ChainSeeds& 
         const auto w = tracer.solve(seed->w, seed->events, seed->ray, lamp.target());
         if (w && is_same_solution(*w, found.w)) return n;
     }
-    ++work.stats.runaways;
-    return most;
+    return {};
 }
 
 /// Makes `y` the light side of the path, from y_0 on.
@@ -169,9 +169,14 @@ std::optional<Join> join_specular(const Scene& scene, const SubPath& z, int t,
                 q = join_survival(share, limits.threshold);
     if (!(u_after < q)) return {};
     found->contribution *= 1 / q;
-    ++work.stats.chains;
-    const uint64_t trials =
+    const auto counted =
         count_trials(*found, lamp, seeds, tracer, limits.most_trials, sampler, work);
+    if (!counted && limits.gives_up) {
+        ++work.stats.runaways;
+        return {};
+    }
+    const uint64_t trials = counted.value_or(limits.most_trials);
+    ++work.stats.chains;
     RenderStats::count_trials(trials, work.stats.chains_by_trials);
     if (work.is_observed) record(lamp, *found, tracer, work.pair);
     return Join{.technique = {Strategy::Specular, found->events.count + 1, t},

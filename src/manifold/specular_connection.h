@@ -27,8 +27,9 @@ struct SpecularLimits {
     int max_depth;  ///< Most edges of a path.
     /// Searches whose expected contribution to the pixel has a smaller luminance are subject to Russian roulette; 0: none.
     float threshold = 0;
-    /// Where a search takes more, this number is taken instead: the contribution is then too small, which is counted.
     uint64_t most_trials = 10'000'000;
+    /// Where a search takes more: whether the contribution is left out, which is counted; or else it is that of `most_trials`.
+    bool gives_up = true;
     /// From which seeds are drawn, too; must not depend on the sample.
     const SeedPhotons* photons = nullptr;
 };

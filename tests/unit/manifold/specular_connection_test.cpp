@@ -257,6 +257,40 @@ TEST(SpecularTrials, DoNotDependOnRoulette) {
               work.stats.chain_seeds - work.stats.chain_trials);
 }
 
+/// A contribution with so many trials would be a very bright pixel, which says nothing.
+TEST(SpecularTrials, OfSearchesThatAreGivenUpContributeNothing) {
+    const Scene scene = test::build(test::lantern_room(test::front_camera(kPixels)));
+    const TechniqueCounts counts{.hit = 1, .next_event = 1, .specular_depth = 4};
+    const Film film(scene.film(), scene.filter());
+    Workspace work;
+    const WalkContext walk{scene, counts, work.stats, {6, 10}};
+    Sampler sampler(SamplerKind::Independent, 5);
+    constexpr uint64_t kMost = 2;
+    uint64_t given_up = 0;
+    int found = 0;
+    for (uint64_t i = 0; i < 40 * kPixels * kPixels; ++i) {
+        sampler.start(0, i);
+        trace_eye_path(walk, film, i % (kPixels * kPixels), sampler, work.z);
+        for (int t = 2; t <= work.z.size(); ++t) {
+            const uint64_t before = work.stats.chain_trials;
+            if (!join_specular(scene, work.z, t, {20}, sampler, counts, work)) continue;
+            const uint64_t trials = work.stats.chain_trials - before;
+            given_up += trials > kMost;
+            const auto x = join_specular(scene, work.z, t, {.max_depth = 20, .most_trials = kMost},
+                                         sampler, counts, work);
+            EXPECT_EQ(x.has_value(), trials <= kMost);
+            found += x.has_value();
+            EXPECT_EQ(work.stats.runaways, given_up);
+            // As in pilots.
+            EXPECT_TRUE(join_specular(scene, work.z, t,
+                                      {.max_depth = 20, .most_trials = kMost, .gives_up = false},
+                                      sampler, counts, work));
+        }
+    }
+    EXPECT_GT(found, 20);
+    EXPECT_GT(given_up, 20u);
+}
+
 /// A lamp below water, and a weaker one that is selected far more often by what is learned.
 std::string pool_with_lamps(const std::string& shape) {
     const auto lamp = [&](const char* x, const char* radiance) {
