@@ -330,3 +330,37 @@ def test_results_are_left_out_without_what_they_show(tmp_path: Path, results: ty
 def test_results_show_each_method_of_the_gallery(results: types.ModuleType) -> None:
     gallery = re.search(r"^METHODS = (\[.*?\])", (ROOT / "bench" / "gallery").read_text(), re.DOTALL | re.MULTILINE)
     assert sorted(results.METHODS) == sorted(ast.literal_eval(gallery[1]))
+
+
+def plugin_pictures(monkeypatch: pytest.MonkeyPatch) -> types.ModuleType:
+    loader = importlib.machinery.SourceFileLoader("plugin_pictures", str(ROOT / "bench" / "plugin-pictures"))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    loader.exec_module(module)
+    return module
+
+
+def test_a_plugin_without_a_picture_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = plugin_pictures(monkeypatch)
+    for category, variants in module.VARIANTS.items():
+        listed = [{"name": name, "doc": "A plug-in."} for name in variants]
+        (tmp_path / f"{category}.json").write_text(json.dumps(listed))
+    program = tmp_path / "etendue"
+    program.write_text(f"#!/bin/sh\ncat {tmp_path}/$2.json\n")
+    program.chmod(0o755)
+    module.check(program)
+    names = list(module.VARIANTS["bsdf"])
+    (tmp_path / "bsdf.json").write_text(json.dumps([{"name": name, "doc": ""} for name in [*names[1:], "velvet"]]))
+    with pytest.raises(SystemExit) as reason:
+        module.check(program)
+    assert "the bsdf velvet has no picture" in str(reason.value)
+    assert f"the bsdf {names[0]}, which etendue does not have" in str(reason.value)
+    assert "emitter" not in str(reason.value)
+
+
+def test_plugins_have_the_pictures_that_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = plugin_pictures(monkeypatch)
+    jobs = list(module.jobs())
+    assert sorted(file for _, file, _ in jobs) == sorted(f.name for f in (ROOT / "docs" / module.FOLDER).iterdir())
+    scenes = [module.scene_with(category, xml) for category, _, xml in jobs]
+    assert len(set(scenes)) == len(scenes)
