@@ -257,6 +257,24 @@ GuideLearning learning_of_emission(GuidedWalks walks) {
     return learning;
 }
 
+/// What some walks record, by blocks. `trace(walk, i, sampler, work, records)` traces the i-th walk.
+template <class Records, class Trace>
+std::vector<Records> trace_in_blocks(const PassContext& pass, const TechniqueCounts& counts,
+                                     const WalkOptions& options, uint64_t walks, uint64_t seed,
+                                     const Trace& trace) {
+    std::vector<Records> blocks((walks + kBlock - 1) / kBlock);
+    pass.for_each_other_path(blocks.size(), [&](uint64_t b, Sampler&, Workspace& work) {
+        Sampler sampler(SamplerKind::Independent, seed);
+        RenderStats stats;  // not of the image
+        const WalkContext walk{pass.scene, counts, stats, options};
+        for (uint64_t i = b * kBlock; i < std::min(walks, (b + 1) * kBlock); ++i) {
+            sampler.start(0, i);
+            trace(walk, i, sampler, work, blocks[b]);
+        }
+    });
+    return blocks;
+}
+
 template <class T>
 void move_to_end(std::vector<T>& to, std::vector<T>& from) {
     to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
@@ -415,21 +433,16 @@ LightSelections Guiding::trained_lights(const PassContext& pass, const DepthOpti
     constexpr uint64_t kWalks = 20000;
     if (pilots_ && pilots_->lights) return *pilots_->lights;
     const uint64_t seed = pilot_seed(pass.seed, PilotUse::Lights);
-    const TechniqueCounts counts = joins_of(GuidedWalks::Both, 1);
     WalkOptions options = depth.walk();
     options.max_vertices = std::min(options.max_vertices, 3);
-    std::vector<std::vector<Arrival>> blocks((kWalks + kBlock - 1) / kBlock);
-    pass.for_each_other_path(blocks.size(), [&](uint64_t b, Sampler&, Workspace& work) {
-        Sampler sampler(SamplerKind::Independent, seed);
-        RenderStats stats;  // not of the image
-        const WalkContext walk{pass.scene, counts, stats, options};
-        for (uint64_t i = b * kBlock; i < std::min(kWalks, (b + 1) * kBlock); ++i) {
-            sampler.start(0, i);
+    auto blocks = trace_in_blocks<std::vector<Arrival>>(
+        pass, joins_of(GuidedWalks::Both, 1), options, kWalks, seed,
+        [](const WalkContext& walk, uint64_t, Sampler& sampler, Workspace& work,
+           std::vector<Arrival>& block) {
             trace_light_path(walk, sampler, work.y);
             if (work.y.size() > 1 && work.y[1].is_connectible)
-                blocks[b].push_back(arrival_of(work.y, share_of_hits(work.y)));
-        }
-    });
+                block.push_back(arrival_of(work.y, share_of_hits(work.y)));
+        });
     std::vector<Arrival> arrivals;
     for (std::vector<Arrival>& b : blocks) move_to_end(arrivals, b);
     LightSelections lights = learned_lights(pass.scene, std::move(arrivals));
@@ -482,30 +495,24 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
     const float eye_walks = float(pass.pixels) / float(std::max<uint64_t>(pass.light_paths, 1));
     WalkOptions options = depth.walk();
     options.max_vertices = std::min(options.max_vertices, kMostVertices + 1);
-    std::vector<Block> blocks((walks + kBlock - 1) / kBlock);
-    pass.for_each_other_path(blocks.size(), [&](uint64_t b, Sampler&, Workspace& work) {
-        Sampler sampler(SamplerKind::Independent, seed);
-        RenderStats stats;  // not of the image
-        const WalkContext walk{pass.scene, counts, stats, options};
-        for (uint64_t i = b * kBlock; i < std::min(walks, (b + 1) * kBlock); ++i) {
-            sampler.start(0, i);
-            trace_light_path(walk, sampler, work.y);
-            record_light_walk(work.y, blocks[b]);
-            trace_eye_path(walk, pass.film, mix64(seed + i) % pass.pixels, sampler, work.z);
-            record_eye_walk(work.z, blocks[b]);
-            if (!for_roulette) continue;
-            const Contributions c =
-                join_walks(walk, light, depth.max_depth, eye_walks, sampler, work.y, work.z);
-            // As in the records, one value that is not finite would be all that is learned.
-            if (c.by_light[0] < kInf) blocks[b].light_contribution += double(c.by_light[0]);
-            record_contributions(work.y, TransportMode::Importance, options.max_vertices,
-                                 c.by_light, {}, blocks[b].contributions);
-            record_contributions(work.z, TransportMode::Radiance, options.max_vertices, c.by_eye,
-                                 left_out_at_vertices(c, light), blocks[b].contributions);
-        }
-    });
+    const auto trace = [&](const WalkContext& walk, uint64_t i, Sampler& sampler, Workspace& work,
+                           Block& block) {
+        trace_light_path(walk, sampler, work.y);
+        record_light_walk(work.y, block);
+        trace_eye_path(walk, pass.film, mix64(seed + i) % pass.pixels, sampler, work.z);
+        record_eye_walk(work.z, block);
+        if (!for_roulette) return;
+        const Contributions c =
+            join_walks(walk, light, depth.max_depth, eye_walks, sampler, work.y, work.z);
+        // As in the records, one value that is not finite would be all that is learned.
+        if (c.by_light[0] < kInf) block.light_contribution += double(c.by_light[0]);
+        record_contributions(work.y, TransportMode::Importance, options.max_vertices, c.by_light,
+                             {}, block.contributions);
+        record_contributions(work.z, TransportMode::Radiance, options.max_vertices, c.by_eye,
+                             left_out_at_vertices(c, light), block.contributions);
+    };
     Block all;
-    for (Block& b : blocks) {
+    for (Block& b : trace_in_blocks<Block>(pass, counts, options, walks, seed, trace)) {
         move_to_end(all.samples, b.samples);
         for (size_t m = 0; m < 2; ++m) move_to_end(all.left_out[m], b.left_out[m]);
         move_to_end(all.emission, b.emission);
