@@ -5,6 +5,7 @@
 #include <chrono>
 #include <map>
 
+#include "integrator/guide_share.h"
 #include "integrator/shared_by_pilots.h"
 #include "math/hash.h"
 #include "sampler/pilot_seed.h"
@@ -28,7 +29,8 @@ struct EmissionRecord {
 
 struct Block {
     std::vector<GuideSample> samples;
-    GuideTree::LeftOut left_out;  ///< That the lens sees, and light of next events.
+    GuideTree::LeftOut left_out;     ///< What other joins find, and what the lens sees.
+    std::vector<PlacedWeight> seen;  ///< By the lens.
     std::vector<EmissionRecord> emission;
     std::vector<ContributionRecord> contributions;
     double light_contribution = 0;  ///< Sum over the light walks.
@@ -67,22 +69,14 @@ GuideSample sample_at(const SubPath& path, int i, TransportMode mode) {
     return s;
 }
 
-/// Share of the light from y_0 that hits bring, rather than next events. Where the walk ended at y_1, an eye walk would have
-/// come from where its last ray went, or from above.
-float share_of_hits(const SubPath& y) {
-    if (y[0].emitter->is_delta()) return 0;
-    const Vertex& v = y[1];
-    const bool has_flight = y.flight.pdf_sa > 0 && !v.is_delta;
-    const Vec3 away = y.size() > 2 ? direction(v, y[2])
-                      : has_flight ? y.flight.d
-                                   : facing_normal(v);
-    const double hit = double(v.eval_unguided(away, TransportMode::Importance).pdf_rev) *
-                       double(v.to_predecessor),
-                 next_event = double(y[0].pdf_fwd) * double(v.next_event_ratio);
-    return hit > 0 ? float(sqr(hit) / (sqr(hit) + sqr(next_event))) : 0.0f;
-}
-
-void record(const GuideSample& s, Block& block) {
+/// Records what the walk can teach at v_i: the share of its light or importance that walks in the other mode find by the
+/// direction. What the join with v_{i-1} finds is left out.
+void record(const SubPath& path, int i, TransportMode mode, float share, Block& block) {
+    GuideSample s = sample_at(path, i, mode);
+    const Vertex& v = path[i];
+    if (share < 1)
+        block.left_out[s.mode].push_back({v.p, side_normal(v), luminance(v.beta) * (1 - share)});
+    s.weight *= share;
     if (s.weight > 0) block.samples.push_back(s);
 }
 
@@ -91,18 +85,13 @@ Arrival arrival_of(const SubPath& y, float hits) {
     return {{y[1].p, side_normal(y[1]), luminance(y[1].beta) * (1 - hits)}, y[0].emitter->index};
 }
 
-void record_light_walk(const SubPath& y, Block& block) {
+void record_light_walk(const SubPath& y, const TechniqueCounts& n, Block& block) {
     PlacedWeight arrival;
     for (int i = 1; i < y.size(); ++i) {
         if (!y[i].is_connectible) continue;
-        GuideSample s = sample_at(y, i, TransportMode::Importance);
-        if (i == 1) {
-            const float hits = share_of_hits(y);
-            s.weight *= hits;
-            arrival = arrival_of(y, hits).at;
-            block.left_out[s.mode].push_back(arrival);
-        }
-        record(s, block);
+        const float share = share_of_walks<TransportMode::Importance>(y, i, n);
+        if (i == 1) arrival = arrival_of(y, share).at;
+        record(y, i, TransportMode::Importance, share, block);
     }
     if (y.size() < 2) return;
     EmissionRecord r{{}, y[0].emitter, {}, arrival};
@@ -124,16 +113,14 @@ void record_light_walk(const SubPath& y, Block& block) {
     if (!r.reached.empty()) block.emission.push_back(std::move(r));
 }
 
-void record_eye_walk(const SubPath& z, Block& block) {
+void record_eye_walk(const SubPath& z, const TechniqueCounts& n, Block& block) {
     bool is_seen = true;  // by the lens, perhaps in mirrors or through panes
     for (int i = 1; i < z.size(); ++i) {
         if (z[i].is_connectible && z[i].kind == Vertex::Kind::Surface) {
+            if (is_seen) block.seen.push_back({z[i].p, side_normal(z[i]), luminance(z[i].beta)});
             // Light walks are connected to the lens. Few hit it, and even fewer by way of a mirror.
-            if (is_seen)
-                block.left_out[size_t(TransportMode::Importance)].push_back(
-                    {z[i].p, side_normal(z[i]), luminance(z[i].beta)});
-            else
-                record(sample_at(z, i, TransportMode::Radiance), block);
+            const float share = is_seen ? 0.0f : share_of_walks<TransportMode::Radiance>(z, i, n);
+            record(z, i, TransportMode::Radiance, share, block);
         }
         is_seen = is_seen && z[i].is_delta;
     }
@@ -238,13 +225,12 @@ bool joins_both(GuidedWalks walks) {
     return walks == GuidedWalks::Both || walks == GuidedWalks::BothWithPairs;
 }
 
-/// Where both walks are joined, guided directions take paths away from techniques that need no guide, and must gain more than
-/// eye walks alone, for which little makes up for the time: with 0.1 nats instead of 0.3, error times time of `path` was 18 %
-/// less on two-rooms and 13 % less on veach-bidir, and 5 % more on veach-ajar, with a standard error of 6 %.
+/// Guided directions take time, so they must gain a little, and more where light walks have no other use than splats. With
+/// 0.1 nats instead of 0.3, error times time of `path` was 18 % less on two-rooms and 13 % less on veach-bidir, and 5 % more
+/// on veach-ajar, with a standard error of 6 %.
 GuideLearning learning_at_surfaces(GuidedWalks walks, bool has_footprints) {
     GuideLearning learning{.has_footprints = has_footprints};
-    if (walks == GuidedWalks::Eye) learning.least_gain = 0.1f;
-    if (joins_both(walks)) learning.least_gain = 1.2f;
+    if (walks != GuidedWalks::Light) learning.least_gain = 0.1f;
     return learning;
 }
 
@@ -407,9 +393,9 @@ bool Guiding::may_gain(const Guide& guide, GuidedWalks walks) {
 }
 
 bool Guiding::gains_nothing(const Guide& guide, GuidedWalks walks) const {
-    // Neither what emission gains nor adjoint-driven roulette depends on them. In the scenes of docs/guiding.md, one of the
-    // two gains 2.9 nats, or both at most 0.3: on veach-bidir, where guided directions make a sample worse.
-    constexpr float kLeastGain = 0.5f;
+    // Neither what emission gains nor adjoint-driven roulette depends on them. Of the scenes in docs/guiding.md, one gains 3
+    // nats, and all others at most 1.1: mirror-box, where guided directions make a sample worse.
+    constexpr float kLeastGain = 2;
     return joins_both(walks) && mode_ != Mode::Footprints &&
            std::max(guide.surfaces.gain(TransportMode::Radiance),
                     guide.surfaces.gain(TransportMode::Importance)) < kLeastGain;
@@ -441,7 +427,8 @@ LightSelections Guiding::trained_lights(const PassContext& pass, const DepthOpti
            std::vector<Arrival>& block) {
             trace_light_path(walk, sampler, work.y);
             if (work.y.size() > 1 && work.y[1].is_connectible)
-                block.push_back(arrival_of(work.y, share_of_hits(work.y)));
+                block.push_back(arrival_of(
+                    work.y, share_of_walks<TransportMode::Importance>(work.y, 1, walk.counts)));
         });
     std::vector<Arrival> arrivals;
     for (std::vector<Arrival>& b : blocks) move_to_end(arrivals, b);
@@ -489,8 +476,9 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
                                         GuidedWalks guided, GuidedLight light, const Guide* teacher,
                                         uint64_t walks, uint64_t seed, bool for_roulette,
                                         bool selects_lights) const {
-    TechniqueCounts counts =
-        for_roulette ? joins_of(guided, pass.light_paths) : joins_of(GuidedWalks::Both, 1);
+    TechniqueCounts counts = joins_of(for_roulette ? guided : GuidedWalks::Both, pass.light_paths);
+    TechniqueCounts competing = joins_of(GuidedWalks::Both, pass.light_paths);
+    if (!joins_both(guided)) competing.connect = 0;
     counts.guide = teacher;
     const float eye_walks = float(pass.pixels) / float(std::max<uint64_t>(pass.light_paths, 1));
     WalkOptions options = depth.walk();
@@ -498,9 +486,9 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
     const auto trace = [&](const WalkContext& walk, uint64_t i, Sampler& sampler, Workspace& work,
                            Block& block) {
         trace_light_path(walk, sampler, work.y);
-        record_light_walk(work.y, block);
+        record_light_walk(work.y, competing, block);
         trace_eye_path(walk, pass.film, mix64(seed + i) % pass.pixels, sampler, work.z);
-        record_eye_walk(work.z, block);
+        record_eye_walk(work.z, competing, block);
         if (!for_roulette) return;
         const Contributions c =
             join_walks(walk, light, depth.max_depth, eye_walks, sampler, work.y, work.z);
@@ -515,6 +503,7 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
     for (Block& b : trace_in_blocks<Block>(pass, counts, options, walks, seed, trace)) {
         move_to_end(all.samples, b.samples);
         for (size_t m = 0; m < 2; ++m) move_to_end(all.left_out[m], b.left_out[m]);
+        move_to_end(all.seen, b.seen);
         move_to_end(all.emission, b.emission);
         move_to_end(all.contributions, b.contributions);
         all.light_contribution += b.light_contribution;
@@ -531,8 +520,7 @@ std::unique_ptr<Guide> Guiding::trained(const PassContext& pass, const DepthOpti
         guide->lights = learned_lights(pass.scene, std::move(arrivals));
     }
     if (mode_ != Mode::Footprints) {
-        auto& seen = all.left_out[size_t(TransportMode::Importance)];
-        learn_emission(pass.scene, all.emission, PlacedDensity(std::move(seen)),
+        learn_emission(pass.scene, all.emission, PlacedDensity(std::move(all.seen)),
                        learning_of_emission(guided), hash_combine(seed, 1), *guide);
     }
     return guide;
