@@ -28,9 +28,10 @@ struct PhaseSeconds {
 struct RenderStats {
     PhaseSeconds phases;
     int time_factor = 0;  ///< Of the seconds of the current sample; 0: it is not timed.
-    /// Every seventh sample is timed: where samples are made in turns of eight (kWalksInTurn), each place as often.
+    /// One sample of 31 is timed, since clocks take long to read. Where samples are made in turns of eight (kWalksInTurn), each
+    /// place is timed as often.
     static int time_factor_of(uint64_t index) {
-        constexpr int kTimedSamples = 7;
+        constexpr int kTimedSamples = 31;
         return index % kTimedSamples == 0 ? kTimedSamples : 0;
     }
     uint64_t eye_paths = 0, light_paths = 0, vertices = 0;
