@@ -20,10 +20,13 @@ def measured(command):
 def samples_in(seconds, seconds_of):
     """The number of samples per pixel in that time, where seconds_of(samples) renders and tells how long it took. Short renderings
     tell what a sample takes, and what the method does before the first one."""
-    samples, used, earlier = 1, seconds_of(1), None
-    while earlier is None or (used < 0.1 * seconds and samples < 4096):
-        earlier = (samples, used)
-        samples *= 2 if used > 0.03 * seconds else 4
-        used = seconds_of(samples)
-    each = max(1e-6, (used - earlier[1]) / (samples - earlier[0]))
-    return max(1, round(samples + (seconds - used) / each)), each
+    first, samples = seconds_of(1), 1
+    growth = 0.0  # of the time by the samples after the first one
+    while growth < 0.1 * seconds and samples < 4096:
+        samples *= 2 if growth > 0.03 * seconds else 4
+        growth = seconds_of(samples) - first
+        if first + growth > seconds:
+            break
+    # Where the growth is that of noise, the last number is near enough.
+    each = max(growth, 0.02 * first, 1e-3 * seconds) / (samples - 1)
+    return max(1, round(samples + (seconds - first - growth) / each))

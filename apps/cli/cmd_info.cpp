@@ -214,9 +214,10 @@ void add_info_command(CLI::App& app) {
     options->choice.add_to(c);
     c.get_option("--choice")->excludes(c.get_option("--guide"));
     std::vector<CLI::Option*> of_both{
-        c.add_option("-i,--integrator", options->integrator,
-                     "Method with parameters: of --guide the one whose guide is trained (default: "
-                     "the scene's), of --choice auto with parameters"),
+        c.add_option(
+            "-i,--integrator", options->integrator,
+            "Method with parameters: of --guide the one whose guide is trained (default: "
+            "the scene's), of --choice `auto` with parameters, or a method with guide=auto"),
         c.add_option("--seed", options->seed, "Seed of the training, or of the choice")
             ->capture_default_str(),
         c.add_option("--threads", options->threads, "Number of threads; 0: one per core")

@@ -56,7 +56,7 @@ std::string python_identity(nb::handle integrator) {
         nb::module_::import_("etendue._integrator").attr("identity")(integrator));
 }
 
-/// The pilots of `auto` take time, and Ctrl-C ends them. `earlier`: the choice of the rendering that goes on, or empty.
+/// Pilots take time, and Ctrl-C ends them. `earlier`: the choice of the rendering that goes on, or empty.
 RenderSettings with_method(const Scene& scene, const RenderSettings& settings,
                            const std::string& earlier) {
     if (!earlier.empty()) {

@@ -394,7 +394,7 @@ bool Guiding::may_gain(const Guide& guide, GuidedWalks walks) {
 
 bool Guiding::gains_nothing(const Guide& guide, GuidedWalks walks) const {
     // Neither what emission gains nor adjoint-driven roulette depends on them. Of the scenes in docs/guiding.md, one gains 3
-    // nats, and all others at most 1.1: mirror-box, where guided directions make a sample worse.
+    // nats, and all others at most 1.2: on mirror-box, with 1.1, guided directions make a sample worse.
     constexpr float kLeastGain = 2;
     return joins_both(walks) && mode_ != Mode::Footprints &&
            std::max(guide.surfaces.gain(TransportMode::Radiance),

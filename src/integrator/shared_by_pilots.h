@@ -1,5 +1,5 @@
 #pragma once
-// What the pilots of `auto` learn or decide once for all of them.
+// What the pilots of one choice learn or decide once for all of them.
 
 #include <map>
 #include <memory>

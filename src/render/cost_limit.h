@@ -10,8 +10,8 @@
 
 namespace etendue {
 
-/// Ends a rendering in the pass, or in the preparation of the first one, that would make it cost more than `most`. Whether it ends
-/// does not depend on the number of threads: it does if the whole pass would cost more.
+/// Ends a rendering in the pass, or in the preparation of the first one, that would make it cost more than `most`. Whether it
+/// ends does not depend on the number of threads: it does if the whole pass would cost more.
 struct CostLimit {
     std::function<double(const RenderStats&)> cost;
     double most;

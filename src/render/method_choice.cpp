@@ -33,8 +33,8 @@ constexpr double kHopeless = 3;
 /// Chains of pilots are short, and see less of where chains stay. On veach-ajar, veach-bidir and two-rooms, the errors of `mlt`
 /// after 60 s are 0.6 to 3 times those predicted without this factor.
 constexpr double kLongChains = 1.5;
-/// Sobol' points gain less with guided walks than without, which the few passes of pilots do not show: on cornell, the noise of
-/// `path` with a guide after 128 passes is 1.06 times that without, where pilots show 0.75.
+/// Sobol' points gain less with guided walks than without, which the few passes of pilots do not show: on cornell, the noise
+/// of `path` with a guide after 128 passes is 1.06 times that without, where pilots show 0.75.
 constexpr double kLongSequences = 1.1;
 /// Walks of each kind that train the guide of a pilot, at least. More of them, up to those of the rendering, train it where this
 /// takes at most a part of what guides may take.
@@ -108,9 +108,18 @@ struct Contender {
         return scene.may_have_chains() &&
                integrator_entry(name()).info.has_param("specular_connections");
     }
-    /// What renders its pilots.
-    IntegratorSpec pilot_spec() const {
+    /// Whether a given number of light paths is that of a whole pass, and not of those that are stored for connections.
+    bool has_light_paths_of_pass() const {
+        const auto given = spec.params.find("light_paths");
+        return name() != "pcbpt" && given != spec.params.end() &&
+               params().integer("light_paths") > 0;
+    }
+    /// What renders its pilots, on films with such a part of the pixels.
+    IntegratorSpec pilot_spec(double part) const {
         IntegratorSpec small = spec;
+        if (has_light_paths_of_pass())
+            small.params["light_paths"] =
+                std::to_string(std::max(1L, std::lround(params().integer("light_paths") * part)));
         // Chains have few states in pilots, and need as many for each as in the rendering. Of the groups, two suffice.
         if (has_chains()) small.params["groups"] = "2", small.params["chains"] = "16";
         small.guide = guide;
@@ -298,11 +307,12 @@ private:
         std::vector<Contender> tried;
         std::vector<MethodChoice::Candidate> untried;
         for (Contender c : contenders_) {
+            const double cost = cost_of(c, each);
             if (c.has_chains() && is_beyond_chains()) {
+                cost_of_others -= is_first ? 0 : cost;
                 untried.push_back(c.shown);
                 continue;
             }
-            const double cost = cost_of(c, each);
             const bool can_wait = is_first && tried.size() >= 2;
             if (can_wait && !budget_.can_spend(cost)) {
                 untried.push_back(c.shown);
@@ -340,7 +350,7 @@ private:
 
     MethodPilot pilot_of(const Scene& small, const Contender& c, double most) {
         RenderSettings settings = settings_;
-        settings.integrator = c.pilot_spec();
+        settings.integrator = c.pilot_spec(double(small.film().pixel_count()) / whole_pixels());
         settings.integrator.shared_by_pilots = shared_by_pilots_;
         const MethodPilot pilot = render_pilot(small, settings, number_, most, drop_);
         number_ += kPilotReplicates;
@@ -421,7 +431,9 @@ private:
         std::vector<double> factors = reuse_factors(noise, growth, ratio);
         for (size_t i = 0; i < factors.size(); ++i) {
             if (noise[i].kind == Kind::Chains) factors[i] = kLongChains;
-            if (contenders_[i].guide && !contenders_[i].has_chains()) factors[i] *= kLongSequences;
+            if (contenders_[i].guide && !contenders_[i].has_chains() &&
+                settings_.sampler == SamplerKind::Sobol)
+                factors[i] *= kLongSequences;
         }
         return factors;
     }
@@ -496,7 +508,8 @@ private:
         const uint64_t affordable = walks_of_pilot(left);
         std::vector<Contender> more;
         for (Contender& c : contenders_) {
-            if (!may_add_guide(c)) continue;
+            // Without noise, there is nothing to gain.
+            if (!may_add_guide(c) || !(c.shown.error() > 0)) continue;
             const uint64_t walks = std::min(affordable, c.walks_of_training());
             const double training = training_seconds(walks),
                          guided = cost_with_guide(c, pixels_of(pixels));

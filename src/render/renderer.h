@@ -46,7 +46,7 @@ struct MethodChoice;
 
 struct RenderSettings : RenderOptions {
     IntegratorSpec integrator{"path", {}};
-    /// How `integrator` was chosen, if `auto` did it; see with_chosen_method().
+    /// How `integrator` was chosen, if pilots did it; see with_chosen_method().
     std::shared_ptr<const MethodChoice> choice = nullptr;
     PathSelection
         shown;  ///< Paths that are added to the image. Other paths are sampled, but not added.
@@ -111,7 +111,7 @@ Vec2 film_offset(SamplerKind kind, uint64_t seed, uint32_t pass);
 class Renderer {
 public:
     /// Throws std::runtime_error if the integrator's parameters are wrong. The scene must outlive the renderer. If the
-    /// integrator is `auto` and no method is chosen yet, it is chosen here, see with_chosen_method().
+    /// integrator is one that pilots choose, and none is chosen yet, it is chosen here, see with_chosen_method().
     Renderer(const Scene& scene, const RenderSettings& settings);
     /// Uses `integrator` instead of settings.integrator, unless it is nullptr.
     Renderer(const Scene& scene, const RenderSettings& settings,

@@ -409,7 +409,7 @@ std::vector<IntegratorSpec> with_long_chains(const std::vector<IntegratorSpec>& 
     return all;
 }
 
-/// What renders: of `auto`, the method that it chooses.
+/// What renders: of `auto`, the method that it chooses, and of guide=auto, guide=on or off.
 IntegratorSpec rendering_method(const Scene& scene, const IntegratorSpec& method,
                                 const VerifyOptions& options) {
     if (!is_chosen_by_pilots(method)) return method;
@@ -426,11 +426,13 @@ IntegratorSpec rendering_method(const Scene& scene, const IntegratorSpec& method
 }
 
 VerifyReport verify(const Scene& scene, const std::vector<IntegratorSpec>& given_methods,
-                    const VerifyOptions& options, const std::optional<ReferenceImage>& reference,
+                    const VerifyOptions& given, const std::optional<ReferenceImage>& reference,
                     const std::function<void(const std::string&)>& progress) {
+    VerifyOptions options = given;
+    for (IntegratorSpec& r : options.against) r = rendering_method(scene, r, given);
     std::vector<IntegratorSpec> chosen;
     for (const IntegratorSpec& m : given_methods)
-        chosen.push_back(rendering_method(scene, m, options));
+        chosen.push_back(rendering_method(scene, m, given));
     const std::vector<IntegratorSpec> methods = with_long_chains(chosen);
     SeriesRenderer renderer(scene, options, progress);
     VerifyReport report;

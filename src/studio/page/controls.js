@@ -45,7 +45,7 @@ function describeFile(run) {
 }
 
 /**
- * Why `auto` has chosen the method of a run.
+ * Why pilots have chosen the method of a run.
  * @param {HTMLElement} details @param {any} auto
  */
 function showChoice(details, auto) {

@@ -287,6 +287,21 @@ TEST(GuideChoice, ShortRenderingsHaveNoPilots) {
     }
 }
 
+/// The number of light paths that is given is that of a whole pass.
+TEST(GuideChoice, PilotsHaveTheirPartOfTheLightPaths) {
+    const Scene scene = scene_of_project("lantern.xml", 160, 120);
+    const MethodChoice few = choice_of(scene, "upg+bdpt:guide=auto", 120),
+                       many = choice_of(scene, "upg+bdpt:guide=auto,light_paths=19200", 120);
+    ASSERT_GT(many.candidates.front().images, 0);
+    EXPECT_LT(many.pilots, 2 * few.pilots);
+}
+
+/// Direct light on its own lamps has no noise.
+TEST(GuideChoice, NothingIsTrainedWithoutNoise) {
+    const Scene scene = scene_of_project("lantern.xml", 160, 120);
+    EXPECT_LT(choice_of(scene, "path:guide=auto,max_depth=1", 60).pilots, 0.1);
+}
+
 /// Chains cannot be shared.
 TEST(MethodChoice, ProcessesThatRenderTogetherChooseTheSameWithoutChains) {
     const Scene scene = scene_of_project("ring.xml", 48, 36);

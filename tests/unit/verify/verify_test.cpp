@@ -120,6 +120,17 @@ TEST(Verify, KeepsRenderingsOfAnInterruptedSearch) {
     EXPECT_TRUE(report.methods[0].image[1].is_tested());
 }
 
+/// All renderings of a reference have the same method.
+TEST(Verify, ReferencesAreChosenOnce) {
+    const Scene scene = build(lit_room(8));
+    VerifyOptions options = quick_options();
+    options.spp = 1;
+    options.against = {IntegratorSpec::parse("path:guide=auto"), IntegratorSpec::parse("auto")};
+    const VerifyReport report = verify(scene, {IntegratorSpec::parse("bdpt")}, options);
+    EXPECT_NE(report.reference.find("guide=off"), std::string::npos) << report.reference;
+    EXPECT_EQ(report.reference.find("auto"), std::string::npos) << report.reference;
+}
+
 TEST(Verify, LeavesOutMethodsThatFail) {
     const Scene scene = build(lit_room(8));
     VerifyOptions options = quick_options();
