@@ -152,14 +152,14 @@ TEST_F(FailuresTest, FullDisksAreNamedAndKeepTheOldImage) {
 /// What took hours is printed even if the file of the report cannot be written.
 TEST_F(FailuresTest, VerdictsAreToldWithoutTheirFile) {
     const fs::path json = folder.path() / "report.json";
-    const ProgramResult r = run({"verify", scene, "--methods", "path", "--runs", "8", "--quiet",
-                                 "--resolution", "8x8", "--json", json},
+    const ProgramResult r = run({"verify", scene, "--methods", "path", "--runs", "8", "--spp", "16",
+                                 "--quiet", "--resolution", "8x8", "--json", json},
                                 "ulimit -f 1;", "");
     EXPECT_EQ(r.status, 1);
     EXPECT_EQ(r.output, "");
     EXPECT_NE(r.errors.find("report.json"), std::string::npos) << r.errors;
-    const ProgramResult told = run({"verify", scene, "--methods", "path", "--runs", "8",
-                                    "--resolution", "8x8", "--json", json},
+    const ProgramResult told = run({"verify", scene, "--methods", "path", "--runs", "8", "--spp",
+                                    "16", "--resolution", "8x8", "--json", json},
                                    "ulimit -f 1;", "");
     EXPECT_EQ(told.status, 1);
     EXPECT_NE(told.output.find("path"), std::string::npos) << told.output;
