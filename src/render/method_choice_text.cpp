@@ -10,7 +10,7 @@
 namespace etendue {
 
 std::string MethodChoice::message() const {
-    const char* const by = asked.starts_with("auto") ? "auto" : "guide=auto";
+    const char* const by = asked.starts_with("auto") || asked.empty() ? "auto" : "guide=auto";
     if (candidates.empty() || candidates.front().images == 0)
         return pilots > 0
                    ? fmt::format("{}: {}, since pilots would take too much of the time (those "
