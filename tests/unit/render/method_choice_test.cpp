@@ -107,11 +107,13 @@ TEST(MethodChoice, IsNoChainWhereConnectionsAloneFindLight) {
     EXPECT_GT(pilots_of_chains(lantern_room(front_camera(32))), 0);
 }
 
-TEST(MethodChoice, IsAFunctionOfSceneSeedAndBudget) {
+/// `asked` for a rendering of so many seconds.
+void expect_function_of_scene_seed_and_budget(const std::string& asked, double seconds) {
     const Scene scene = scene_of_project("ring.xml", 160, 120);
-    RenderSettings settings = settings_of(scene, "auto", 4);
+    RenderSettings settings = settings_of(scene, asked, seconds);
     const auto text = [&] {
         MethodChoice c = *with_chosen_method(scene, settings).choice;
+        EXPECT_GT(c.candidates.front().images, 0);
         c.seconds = 0;
         return c.to_json().dump();
     };
@@ -124,6 +126,10 @@ TEST(MethodChoice, IsAFunctionOfSceneSeedAndBudget) {
     EXPECT_EQ(text(), first);
     settings.seed = 1;
     EXPECT_NE(text(), first);
+}
+
+TEST(MethodChoice, IsAFunctionOfSceneSeedAndBudget) {
+    expect_function_of_scene_seed_and_budget("auto", 4);
 }
 
 /// A rendering of some passes.
@@ -223,21 +229,7 @@ TEST(GuideChoice, ExistsForEachMethodThatHasAGuide) {
 }
 
 TEST(GuideChoice, IsAFunctionOfSceneSeedAndBudget) {
-    const Scene scene = scene_of_project("ring.xml", 160, 120);
-    RenderSettings settings = settings_of(scene, "pcbpt:guide=auto", 30);
-    const auto text = [&] {
-        MethodChoice c = *with_chosen_method(scene, settings).choice;
-        EXPECT_GT(c.candidates.back().images, 0);
-        c.seconds = 0;
-        return c.to_json().dump();
-    };
-    const std::string first = text();
-    for (const int threads : {1, 3}) {
-        settings.threads = threads;
-        EXPECT_EQ(text(), first);
-    }
-    settings.seed = 1;
-    EXPECT_NE(text(), first);
+    expect_function_of_scene_seed_and_budget("pcbpt:guide=auto", 30);
 }
 
 TEST(GuideChoice, TheChosenTextGivesTheSameBits) {
