@@ -364,3 +364,70 @@ def test_plugins_have_the_pictures_that_are_listed(monkeypatch: pytest.MonkeyPat
     assert sorted(file for _, file, _ in jobs) == sorted(f.name for f in (ROOT / "docs" / module.FOLDER).iterdir())
     scenes = [module.scene_with(category, xml) for category, _, xml in jobs]
     assert len(set(scenes)) == len(scenes)
+
+
+def test_results_know_files_of_other_folders(tmp_path: Path, results: types.ModuleType, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "examples").mkdir()
+    notebook = tmp_path / "examples" / "a.ipynb"
+    part = results.Part("notebooks", "Notebooks", 1, ["path"], ["../../examples/*.ipynb"], lambda c: iter([["touch", str(notebook)]]))
+    results.PARTS[:] = [part]
+    results.make(part, context(results, tmp_path), MACHINE)
+    manifest = json.loads(results.MANIFEST.read_text())
+    results.MANIFEST.write_text(json.dumps({"notebooks": manifest["notebooks"] | {"quick": False}}))
+    assert list(manifest["notebooks"]["files"]) == ["../../examples/a.ipynb"]
+    (tmp_path / "docs" / "figures" / "speed.json").unlink()
+    capsys.readouterr()
+    results.check()
+    assert "examples/a.ipynb" not in capsys.readouterr().err
+    notebook.write_text("{}")
+    assert results.check() == 1
+    assert "examples/a.ipynb is not what the part notebooks wrote on 2026-11-30" in capsys.readouterr().err.splitlines()[0]
+    (tmp_path / "examples" / "b.ipynb").write_text("{}")
+    results.check()
+    assert '\nexamples/b.ipynb was not written by its part' in capsys.readouterr().err
+    notebook.unlink()
+    results.check()
+    assert "\nnotebooks: examples/a.ipynb is missing" in "\n" + capsys.readouterr().err
+
+
+def test_scenes_of_others_are_recognised(tmp_path: Path) -> None:
+    sys.path.insert(0, str(ROOT / "bench"))
+    import public_scenes
+
+    def check() -> tuple[int, str]:
+        run = subprocess.run([sys.executable, str(ROOT / "scripts" / "scenes"), "--check"], capture_output=True, text=True,
+                             env={"ETENDUE_SCENES": str(tmp_path), "PATH": "/usr/bin:/bin"})
+        return run.returncode, run.stdout + run.stderr
+
+    status, text = check()
+    assert status == 0 and f"{len(public_scenes.SCENES)} skipped" in text
+    folder = tmp_path / "veach-bidir-mts3"
+    folder.mkdir()
+    status, text = check()
+    assert status == 1 and "veach-bidir-mts3/scene.xml is missing" in text
+    (folder / "scene.xml").write_text("<scene/>")
+    status, text = check()
+    assert status == 1 and "veach-bidir-mts3/scene.xml is another file: " in text and "not 5d0d438d4f72e07d" in text
+
+
+def test_checksums_of_folders_are_of_what_scenes_read(tmp_path: Path) -> None:
+    sys.path.insert(0, str(ROOT / "bench"))
+    import public_scenes
+
+    def checksum(changed: str = "", text: str = "1") -> str:
+        for name in ("scene.xml", "meshes/a.ply", "LICENSE.txt", "reference/a.exr"):
+            file = tmp_path / name
+            file.parent.mkdir(exist_ok=True)
+            file.write_text(text if name == changed else "0")
+        return public_scenes.checksum_of_folder(tmp_path)
+
+    assert checksum() == checksum("LICENSE.txt") == checksum("reference/a.exr")
+    assert len({checksum(), checksum("scene.xml"), checksum("meshes/a.ply"), checksum("meshes/a.ply", "2")}) == 4
+
+
+def test_the_picture_of_the_layers_is_that_of_the_build(tmp_path: Path) -> None:
+    subprocess.run([sys.executable, str(ROOT / "bench" / "layers"), "-o", str(tmp_path / "layers.svg")], check=True)
+    shown = (tmp_path / "layers.svg").read_text()
+    assert shown == (ROOT / "docs" / "figures" / "layers.svg").read_text(), "run scripts/results --only layers"
+    folders = [f.name for f in (ROOT / "src").iterdir() if f.is_dir()]
+    assert all(f">{name}</text>" in shown for name in folders)
