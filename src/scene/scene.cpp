@@ -25,7 +25,6 @@ float largest_term(const Transform::Matrix& m, Vec3 p) {
 /// Transforms the geometry of an instance's shape to world space.
 void transform_geometry(const Accelerator::Instance& instance, SurfaceGeometry& g) {
     const Transform& t = instance.to_world;
-    const float side = t.determinant3() < 0 ? -1.0f : 1.0f;
     g.p = t.point(g.p);
     const Vec3 ng = t.normal(g.ng);
     const float to_world = 1 / length(ng);  // of distances along the normal
@@ -34,8 +33,8 @@ void transform_geometry(const Accelerator::Instance& instance, SurfaceGeometry& 
     const float reach = largest_coordinate(g.p) + instance.translation;
     g.slack = (g.slack + kErrors * largest_term(t.inverse_matrix(), g.p) + instance.error * reach) *
               to_world;
-    g.ng = ng * (to_world * side);
-    g.ns = normalize(t.normal(g.ns)) * side;
+    g.ng = ng * to_world;
+    g.ns = normalize(t.normal(g.ns));
     g.dpdu = t.vector(g.dpdu);
     g.dpdv = t.vector(g.dpdv);
 }
@@ -140,10 +139,9 @@ std::optional<SurfaceJet> Scene::jet(const SurfaceLocation& at, Vec3d o, Vec3d d
     j->p = mapped(t.matrix(), j->p, 1);
     j->dpdu = mapped(t.matrix(), j->dpdu, 0);
     j->dpdv = mapped(t.matrix(), j->dpdv, 0);
-    const double side = t.determinant3() < 0 ? -1 : 1;
-    j->ng = normalize(mapped_normal(j->ng)) * side;
+    j->ng = normalize(mapped_normal(j->ng));
     const Vec3d n = mapped_normal(j->ns);
-    const double size = length(n) * side;
+    const double size = length(n);
     j->ns = n / size;
     for (Vec3d* dn : {&j->dnsdu, &j->dnsdv}) {
         const Vec3d v = mapped_normal(*dn);

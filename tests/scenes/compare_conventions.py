@@ -236,6 +236,21 @@ value="400:0.1, 500:0.3, 550:0.7, 600:0.5, 700:0.2"/>""", "diffuse")),
 </shape><shape type="instance"><ref id="g"/><transform name="to_world"><scale value="0.5"/>
 <rotate y="1" angle="30"/><translate x="-0.6"/></transform></shape><shape type="instance">
 <ref id="g"/><transform name="to_world"><scale value="0.3"/><translate x="0.6"/></transform></shape>"""),
+    **{f"mirrored instance, {n}": (None, LIGHT + f"""<shape type="shapegroup" id="g">{shape}</shape>
+<shape type="instance"><ref id="g"/><transform name="to_world"><scale x="-0.5" y="0.5" z="0.5"/>
+<rotate y="1" angle="30"/><translate x="-0.6"/></transform></shape><shape type="instance"><ref id="g"/>
+<transform name="to_world"><scale x="0.4" y="0.3" z="-0.3"/><translate x="0.6"/></transform></shape>""")
+       for n, shape in {
+           "cube": f'<shape type="cube">{INNER}</shape>',
+           "glass": '<shape type="sphere"><bsdf type="dielectric"/></shape>',
+           "metal": f'<shape type="sphere"><bsdf type="conductor">{METAL}</bsdf></shape>',
+           "rectangle": f'<shape type="rectangle">{INNER}</shape>',
+           "mesh": f"""<shape type="obj"><string name="filename" value="quad.obj"/>
+<boolean name="face_normals" value="true"/>{INNER}</shape>""",
+           "bumpmap": f"""<shape type="rectangle"><bsdf type="bumpmap">
+{texture("displacement", '<boolean name="raw" value="true"/>', "bumps.exr")}{numbers(scale=0.3)}{PLAIN}{INNER}
+</bsdf></shape>""",
+       }.items()},
     "absorbing glass": (None, LIGHT + """<shape type="sphere"><bsdf type="dielectric"/>
 <medium name="interior" type="homogeneous"><rgb name="albedo" value="0"/>
 <rgb name="sigma_t" value="0.2, 0.5, 0.9"/><float name="scale" value="1.5"/></medium></shape>"""),

@@ -59,6 +59,12 @@ std::vector<ChainCase> cases() {
              "</shape><shape type=\"instance\"><ref id=\"g\"/><transform name=\"to_world\">"
              "<rotate z=\"1\" angle=\"20\"/><scale x=\"1.2\" y=\"0.8\" "
              "z=\"1\"/></transform></shape>"},
+        {"mirrored_instance",
+         "<shape type=\"shapegroup\" id=\"g\">" +
+             test::sphere("0,0,0", "0.5", test::bump_mapped(test::kGlass, "0.02", "2")) +
+             "</shape><shape type=\"instance\"><ref id=\"g\"/><transform name=\"to_world\">"
+             "<rotate z=\"1\" angle=\"20\"/><scale x=\"-1.2\" y=\"0.8\" "
+             "z=\"1\"/></transform></shape>"},
     };
 }
 

@@ -41,6 +41,11 @@ std::vector<SpecularCase> weight_cases() {
                          sphere("0,-0.2,0.1", "0.45", bump_mapped(kGlass, "0.02", "2")) +
                          sphere("-0.6,-0.6,0.1", "0.3",
                                 bump_mapped("<bsdf type=\"conductor\"/>", "0.02", "2"))},
+        {"mirrored_instance",
+         front + area_lamp() + "<shape type=\"shapegroup\" id=\"g\">" +
+             sphere("0,-0.2,0.1", "0.45", kGlass) +
+             "</shape><shape type=\"instance\"><ref id=\"g\"/><transform name=\"to_world\">"
+             "<scale x=\"-1\"/></transform></shape>"},
         {"several",
          front + area_lamp() + sphere("0,-0.2,0.1", "0.45", kGlass) +
              sphere("0.1,-0.2,0.1", "0.1",
