@@ -431,3 +431,34 @@ def test_the_picture_of_the_layers_is_that_of_the_build(tmp_path: Path) -> None:
     assert shown == (ROOT / "docs" / "figures" / "layers.svg").read_text(), "run scripts/results --only layers"
     folders = [f.name for f in (ROOT / "src").iterdir() if f.is_dir()]
     assert all(f">{name}</text>" in shown for name in folders)
+
+
+def script_of_bench(name: str, monkeypatch: pytest.MonkeyPatch) -> types.ModuleType:
+    monkeypatch.syspath_prepend(str(ROOT / "bench"))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    loader = importlib.machinery.SourceFileLoader(name.replace("-", "_"), str(ROOT / "bench" / name))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+    loader.exec_module(module)
+    return module
+
+
+def test_sheets_show_scenes_that_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    sheet, symptoms = (script_of_bench(name, monkeypatch) for name in ("contact-sheet", "symptoms"))
+    import public_scenes
+
+    own = {file.stem for file in (ROOT / "scenes").glob("*.xml")}
+    folders = {s.folder for s in public_scenes.SCENES}
+    assert sheet.METHODS.keys() <= own | folders and sheet.NEED_LENIENT <= folders
+    assert {scene for scene, *_ in symptoms.STRIPS.values()} <= own
+    labels = [name for s in public_scenes.SCENES for name, _ in s.labels()]
+    assert len(set(labels)) == len(labels) == sum(len(s.files) for s in public_scenes.SCENES)
+
+
+def test_notebooks_are_stored_without_the_moment(monkeypatch: pytest.MonkeyPatch) -> None:
+    notebooks = script_of_bench("notebooks", monkeypatch)
+    assert notebooks.without_moment(f"12 spp in 1.3 s, of {ROOT}/scenes/a.xml") == "12 spp in … s, of scenes/a.xml"
+    assert notebooks.without_moment("1.3 samples, 4 shapes") == "1.3 samples, 4 shapes"
+    head = "<table><thead><tr><th></th><th>spp</th><th>seconds</th></tr></thead><tbody>"
+    row = "<tr><th>0</th><td>8</td><td>{}</td></tr>"
+    end = "</tbody></table>"
+    assert notebooks.html_of(head + row.format("0.25") + row.format("3") + end) == head + 2 * row.format("…") + end
