@@ -448,7 +448,7 @@ def test_sheets_show_scenes_that_there_are(monkeypatch: pytest.MonkeyPatch) -> N
 
     own = {file.stem for file in (ROOT / "scenes").glob("*.xml")}
     folders = {s.folder for s in public_scenes.SCENES}
-    assert sheet.METHODS.keys() <= own | folders and sheet.NEED_LENIENT <= folders
+    assert sheet.METHODS.keys() | sheet.EXPOSURES.keys() <= own | folders and sheet.NEED_LENIENT <= folders
     assert {scene for scene, *_ in symptoms.STRIPS.values()} <= own
     labels = [name for s in public_scenes.SCENES for name, _ in s.labels()]
     assert len(set(labels)) == len(labels) == sum(len(s.files) for s in public_scenes.SCENES)
