@@ -54,6 +54,7 @@ public:
         }
         // Roots are written where they stand, and others refer to them.
         for (const int root : scene.roots) uses_[size_t(root)] += 2;
+        for (const int root : scene.roots) find_inputs(root);
     }
 
     std::string run() {
@@ -79,6 +80,35 @@ private:
         const bool can_stand_alone = o.category == "bsdf" || o.category == "texture" ||
                                      o.category == "medium" || o.type == "shapegroup";
         return can_stand_alone && uses_[size_t(index)] > 1;
+    }
+
+    /// Finds the files that an object and its descendants name, before any file is written.
+    void find_inputs(int index) {
+        if (!searched_.insert(index).second) return;
+        const SceneObject& o = scene_.objects[size_t(index)];
+        const bool is_embedded = o.find("image") && !scene_.images.empty();
+        for (const char* name : {"filename", "user_paths"}) {
+            const Param* p = o.find(name);
+            if (!p || p->type() != ParamType::String || is_embedded) continue;
+            const std::string file = resolve_file({scene_, index}, name);
+            inputs_[{index, name}] = file;
+            taken_.insert(canonical(file));
+        }
+        for (const auto& c : o.children) find_inputs(c.object);
+    }
+
+    static std::filesystem::path canonical(const std::filesystem::path& file) {
+        std::error_code error;
+        const auto path = std::filesystem::weakly_canonical(file, error);
+        return error ? file : path;
+    }
+
+    /// A name for a file that is made of an object: not that of a file that the scene reads.
+    std::string free_name(const std::string& stem, const char* extension) const {
+        std::string name = fmt::format("{}/{}.{}", files_folder_, stem, extension);
+        for (int i = 1; taken_.contains(canonical(folder_ / name)); ++i)
+            name = fmt::format("{}/{}_{}.{}", files_folder_, stem, i, extension);
+        return name;
     }
 
     /// Writes the shared descendants of an object, the innermost first.
@@ -108,6 +138,9 @@ private:
 
     void write_object(int index, const std::string& name, int depth) {
         SceneObject o = scene_.objects[size_t(index)];
+        for (Param& p : o.params)
+            if (const auto input = inputs_.find({index, p.name}); input != inputs_.end())
+                p.value = name_in_folder(input->second);
         if (o.category == "shape") write_mesh(index, o);
         // Only the sample count of a sampler is used, and Mitsuba 3 does not have all of them.
         if (o.category == "sampler") o.type = "independent";
@@ -119,7 +152,7 @@ private:
             open += fmt::format(" id=\"{}\"", escape(id_of(index)));
         if (!name.empty()) open += fmt::format(" name=\"{}\"", escape(name));
         line(depth, open + ">");
-        for (const Param& p : o.params) write_param(index, o, p, depth + 1);
+        for (const Param& p : o.params) write_param(o, p, depth + 1);
         for (const auto& c : o.children) {
             if (written_.count(c.object) && is_shared(c.object))
                 line(
@@ -132,7 +165,7 @@ private:
         line(depth, fmt::format("</{}>", o.category));
     }
 
-    void write_param(int index, const SceneObject& o, const Param& p, int depth) {
+    void write_param(const SceneObject& o, const Param& p, int depth) {
         const std::string name = escape(p.name);
         const auto simple = [&](const char* element, const std::string& value) {
             line(depth, fmt::format("<{} name=\"{}\" value=\"{}\"/>", element, name, value));
@@ -142,10 +175,7 @@ private:
         case ParamType::Int:
             return simple("integer", fmt::format("{}", std::get<int64_t>(p.value)));
         case ParamType::Float: return simple("float", fmt::format("{}", std::get<double>(p.value)));
-        case ParamType::String: {
-            const std::string& text = std::get<std::string>(p.value);
-            return simple("string", escape(p.name == "filename" ? file_name(index, text) : text));
-        }
+        case ParamType::String: return simple("string", escape(std::get<std::string>(p.value)));
         case ParamType::Vector: {
             const Vec3 v = std::get<Vec3>(p.value);
             const bool is_direction = p.name.find("direction") != p.name.npos;
@@ -172,11 +202,7 @@ private:
     }
 
     /// A file of the scene, as seen from the folder of the XML file.
-    std::string file_name(int index, const std::string& name) const {
-        if (scene_.objects[size_t(index)].find("filename") == nullptr ||
-            name.rfind(files_folder_ + "/", 0) == 0)
-            return name;
-        const std::filesystem::path file = resolve_file({scene_, index});
+    std::string name_in_folder(const std::filesystem::path& file) const {
         std::error_code error;
         const auto relative = std::filesystem::proximate(
             file, folder_.empty() ? std::filesystem::path(".") : folder_, error);
@@ -206,7 +232,9 @@ private:
                 params.fail("shape \"mesh\" needs a mesh, which only some formats can hold");
             mesh = scene_.meshes[size_t(params.integer("mesh", 0, 0, count - 1))];
         } else {
-            mesh = read_ply(resolve_file({scene_, index}),
+            // Without a file name, resolve_file() reports what is missing.
+            const auto input = inputs_.find({index, "filename"});
+            mesh = read_ply(input != inputs_.end() ? input->second : resolve_file({scene_, index}),
                             {.flip_tex_coords = flag(o, "flip_tex_coords", false)});
         }
         const bool compute_normals = flag(o, "compute_normals", true);
@@ -226,7 +254,7 @@ private:
         for (const char* name :
              {"mesh", "filename", "compute_normals", "flip_flat_normals", "flip_tex_coords"})
             remove(o, name);
-        const std::string name = fmt::format("{}/mesh{}.ply", files_folder_, index);
+        const std::string name = free_name(fmt::format("mesh{}", index), "ply");
         add_file_({name, write_ply(mesh)});
         o.type = "ply";
         o.params.push_back({"filename", name, o.where});
@@ -237,8 +265,7 @@ private:
         const auto count = int64_t(scene_.images.size());
         const auto index = size_t(Params(scene_, object).integer("image", 0, 0, count - 1));
         const std::string& bytes = scene_.images[index]->bytes;
-        const std::string name =
-            fmt::format("{}/image{}.{}", files_folder_, index, extension_of(bytes));
+        const std::string name = free_name(fmt::format("image{}", index), extension_of(bytes));
         if (written_images_.insert(index).second) add_file_({name, bytes});
         remove(o, "image");
         o.params.push_back({"filename", name, o.where});
@@ -252,7 +279,9 @@ private:
     bool shows_vertex_colors_ = false;
     std::set<std::string> ids_, named_;
     std::map<int, std::string> made_ids_;
-    std::set<int> visited_, written_;
+    std::set<int> searched_, visited_, written_;
+    std::map<std::pair<int, std::string>, std::string> inputs_;  ///< By object and parameter.
+    std::set<std::filesystem::path> taken_;  ///< The same files as canonical paths.
     std::set<size_t> written_images_;
     std::string out_;
 };
