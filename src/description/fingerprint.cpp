@@ -8,6 +8,7 @@
 #include <fstream>
 #include <vector>
 
+#include "description/resolve_file.h"
 #include "math/content_hash.h"
 
 namespace etendue {
@@ -115,16 +116,10 @@ private:
         hash_.add(std::string_view(reinterpret_cast<const char*>(values.data()),
                                    values.size() * sizeof(T)));
     }
-    /// The contents of the file `name` in the scene's search paths, if there is one.
+    /// The contents of the file `name`, if there is one: what resolve_file() finds.
     void add_file(const std::string& name) {
         if (name.empty()) return;
-        for (const std::string& folder : *folders_) {
-            const fs::path path = fs::path(folder) / name;
-            std::error_code ignored;
-            if (!fs::is_regular_file(path, ignored)) continue;
-            add_contents(path, hash_);
-            return;
-        }
+        if (const auto path = find_file(name, *folders_)) add_contents(*path, hash_);
     }
 
     ContentHash hash_;

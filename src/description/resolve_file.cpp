@@ -85,6 +85,27 @@ std::vector<std::string> spellings(const std::string& file) {
     return all;
 }
 
+std::optional<std::string> find_file(const std::string& file,
+                                     const std::vector<std::string>& folders,
+                                     std::vector<std::string>* searched) {
+    for (const std::string& spelling : spellings(file)) {
+        std::vector<fs::path> places;
+        if (fs::path(spelling).is_absolute())
+            places.emplace_back(spelling);
+        else if (folders.empty())
+            places.push_back(fs::path(".") / spelling);
+        else
+            for (const std::string& folder : folders) places.push_back(fs::path(folder) / spelling);
+        for (const fs::path& place : places) {
+            std::error_code error;
+            if (fs::is_regular_file(place, error)) return place.string();
+            const fs::path folder = place.parent_path();
+            if (searched) searched->push_back(folder.empty() ? "." : folder.string());
+        }
+    }
+    return {};
+}
+
 std::string near_file_hint(const std::string& file, const std::vector<std::string>& folders) {
     const std::string slashes = spellings(file).back();
     const fs::path path = slashes;
@@ -127,19 +148,7 @@ std::string resolve_file(const Params& params, std::string_view name) {
     std::vector<std::string> folders = params.scene().search_paths;
     if (folders.empty()) folders.emplace_back(".");
     std::vector<std::string> searched;
-    for (const std::string& spelling : spellings(file)) {
-        std::vector<fs::path> places;
-        if (fs::path(spelling).is_absolute())
-            places.emplace_back(spelling);
-        else
-            for (const std::string& folder : folders) places.push_back(fs::path(folder) / spelling);
-        for (const fs::path& place : places) {
-            std::error_code error;
-            if (fs::is_regular_file(place, error)) return place.string();
-            const fs::path folder = place.parent_path();
-            searched.push_back(folder.empty() ? "." : folder.string());
-        }
-    }
+    if (const auto found = find_file(file, folders, &searched)) return *found;
     params.fail(name, fmt::format("there is no file \"{}\" (looked in {}{})", file,
                                   fmt::join(searched, ", "), near_file_hint(file, folders)));
 }

@@ -1,6 +1,7 @@
 #pragma once
 // Search for the files that a scene names, and for the images that it holds in their place.
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -19,6 +20,12 @@ const EncodedImage* embedded_image(const Params& params);
 
 /// The names under which a file is looked for: its own, and with '/' for '\', which scenes written on Windows have.
 std::vector<std::string> spellings(const std::string& file);
+
+/// Path of a file: `file` itself if it is absolute, otherwise in the first of the folders that has it, "." if there are no
+/// folders. `searched`: gets the folders in which it is not.
+std::optional<std::string> find_file(const std::string& file,
+                                     const std::vector<std::string>& folders,
+                                     std::vector<std::string>* searched = nullptr);
 
 /// What follows the message about a missing file: "; did you mean "wood.png"?", or "". Names that differ in case alone
 /// are near, and so are files of the same name in other folders than that of a path of another machine.

@@ -179,6 +179,22 @@ TEST(Fingerprint, CountsTheBytesOfNamedFiles) {
     EXPECT_NE(one, two);
 }
 
+// Such names stand in scenes that were written on Windows; resolve_file() finds the files, too.
+TEST(Fingerprint, CountsTheBytesOfFilesNamedWithBackslashes) {
+    const test::TemporaryFolder folder;
+    std::filesystem::create_directory(folder.path() / "tex");
+    Parts parts;
+    parts.scene.search_paths = {folder.path().string()};
+    parts.scene.objects[0].params[3].value = std::string("tex\\wood.png");
+    const uint64_t missing = parts.fingerprint();
+    std::ofstream(folder.path() / "tex/wood.png") << "one";
+    const uint64_t one = parts.fingerprint();
+    std::ofstream(folder.path() / "tex/wood.png") << "two";
+    const uint64_t two = parts.fingerprint();
+    EXPECT_NE(missing, one);
+    EXPECT_NE(one, two);
+}
+
 TEST(Fingerprint, OfTheProgramIsThatOfItsFile) {
     EXPECT_EQ(program_fingerprint(), file_fingerprint("/proc/self/exe"));
     EXPECT_NE(program_fingerprint(), file_fingerprint(""));
