@@ -13,6 +13,7 @@
 #include <memory>
 #include <mutex>
 #include <new>
+#include <numeric>
 #include <stdexcept>
 #include <system_error>
 
@@ -207,7 +208,6 @@ struct PngReader : PngState {
 struct PngHeader {
     uint32_t width, height;
     int channels, depth;
-    bool is_linear;
 };
 
 void take_bytes(png_structp png, png_bytep to, size_t size) {
@@ -229,8 +229,6 @@ bool read_png_header(PngReader& reader, std::string_view& rest, Escape& escape, 
     if (type == PNG_COLOR_TYPE_GRAY && png_get_bit_depth(png, info) < 8)
         png_set_expand_gray_1_2_4_to_8(png);
     if (png_get_valid(png, info, PNG_INFO_tRNS)) png_set_tRNS_to_alpha(png);
-    double gamma = 0;
-    header.is_linear = png_get_gAMA(png, info, &gamma) && std::fabs(gamma - 1) < 1e-3;
     png_set_interlace_handling(png);
     if (png_get_bit_depth(png, info) == 16) png_set_swap(png);
     png_read_update_info(png, info);
@@ -272,10 +270,9 @@ ImageContents read_png(const ImageSource& source) {
     for (size_t y = 0; y < rows.size(); ++y) rows[y] = first + y * row;
     if (!read_png_rows(reader, escape, rows.data())) fail_read(path, escape.message);
     const int width = int(header.width), height = int(header.height);
-    ImageContents c = is_deep ? deeply_coded(width, height, header.channels, fractions_of(deep))
-                              : coded(width, height, header.channels, std::move(bytes));
-    c.is_linear = header.is_linear;
-    return c;
+    // Whatever gAMA or a profile says: scenes decide whether codes are sRGB, as in Mitsuba, pbrt and glTF.
+    return is_deep ? deeply_coded(width, height, header.channels, fractions_of(deep))
+                   : coded(width, height, header.channels, std::move(bytes));
 }
 
 void append_bytes(png_structp png, png_bytep data, size_t size) {
@@ -541,7 +538,38 @@ Image to_image(ImageContents c) {
     return image;
 }
 
-PixelBuffer to_pixels(ImageContents c, bool raw) {
+/// Leaves the colours, or grey, and behind them alpha, whatever other channels there are.
+void keep_colours(ImageContents& c, const std::string& name) {
+    std::vector<int> kept;
+    try {
+        const auto& index = rgb_channels(c.channels).index;
+        kept.assign(index, index + (index[0] == index[1] ? 1 : 3));
+    } catch (const std::runtime_error& e) {
+        fail_read(name, e.what());
+    }
+    PixelBuffer& p = c.pixels;
+    if (p.alpha_channel >= 0) {
+        auto at = std::find(kept.begin(), kept.end(), p.alpha_channel);
+        if (at == kept.end()) at = kept.insert(at, p.alpha_channel);
+        p.alpha_channel = int(at - kept.begin());
+    }
+    std::vector<int> all(size_t(p.channels));
+    std::iota(all.begin(), all.end(), 0);
+    if (kept == all) return;
+    std::visit(
+        [&](auto& values) {
+            std::remove_reference_t<decltype(values)> some;
+            some.reserve(values.size() / all.size() * kept.size());
+            for (size_t pixel = 0; pixel < values.size(); pixel += all.size())
+                for (const int channel : kept) some.push_back(values[pixel + size_t(channel)]);
+            values = std::move(some);
+        },
+        p.data);
+    p.channels = int(kept.size());
+}
+
+PixelBuffer to_pixels(ImageContents c, const std::string& name, bool raw) {
+    keep_colours(c, name);
     const bool is_deep = std::holds_alternative<std::vector<float>>(c.pixels.data);
     if (is_deep && !c.is_linear && !raw) c.pixels.data = to_floats(c, false);
     return std::move(c.pixels);
@@ -558,12 +586,12 @@ Image decode_image(const std::string& bytes, const std::string& name) {
 }
 
 PixelBuffer read_pixels(const std::string& path, bool raw) {
-    return decode_in_memory(path, [&] { return to_pixels(read_contents(path, false), raw); });
+    return decode_in_memory(path, [&] { return to_pixels(read_contents(path, false), path, raw); });
 }
 
 PixelBuffer decode_pixels(const std::string& bytes, const std::string& name, bool raw) {
     return decode_in_memory(name, [&] {
-        return to_pixels(contents_of({name, bytes}, false), raw);
+        return to_pixels(contents_of({name, bytes}, false), name, raw);
     });
 }
 

@@ -12,7 +12,7 @@
 namespace etendue {
 
 /// Reads .exr (flat, its first part), .png, .jpg, .hdr, .pfm, .tga, .bmp, .pgm and .ppm. The content decides, not the name.
-/// Integer formats are decoded from sRGB, except alpha and files declared linear.
+/// Integer formats are decoded from sRGB, except alpha, whatever the file says about its codes.
 Image read_image(const std::string& path);
 /// The same for the bytes of a file; `name` is its name in messages.
 Image decode_image(const std::string& bytes, const std::string& name);
@@ -25,8 +25,8 @@ struct RgbImage {
 RgbImage read_rgb(const std::string& path, std::string_view layer = "");
 RgbImage decode_rgb(const std::string& bytes, const std::string& name);
 
-/// Reads pixels for a texture in the file's own precision. 8-bit formats stay codes; deeper integer formats become
-/// floats, decoded from sRGB unless `raw`.
+/// Reads pixels for a texture in the file's own precision: the colours of rgb_channels(), one channel where they are grey,
+/// and alpha behind them. 8-bit formats stay codes; deeper integer formats become floats, decoded from sRGB unless `raw`.
 PixelBuffer read_pixels(const std::string& path, bool raw);
 /// The same for the bytes of a file; `name` is its name in messages.
 PixelBuffer decode_pixels(const std::string& bytes, const std::string& name, bool raw);

@@ -117,6 +117,51 @@ TEST_F(ImageIo, HalfExrRoundsAndClamps) {
     EXPECT_EQ(buffer.memory_bytes(), 5u * 3 * 4 * 2);
 }
 
+/// An image of one pixel with the values 1, 2, 3, ... in these channels.
+Image counted(const std::vector<std::string>& channels) {
+    Image image(1, 1, channels);
+    for (size_t c = 0; c < channels.size(); ++c) image.data[c] = float(c + 1);
+    return image;
+}
+
+// The channels of a texture are those of the colours and alpha, whatever others there are and in whatever order.
+TEST_F(ImageIo, PixelsOfExrAreChosenByName) {
+    struct Case {
+        std::vector<std::string> channels;
+        std::vector<float> values;
+        int alpha;
+    };
+    const Case cases[] = {
+        {{"R", "G", "B"}, {1, 2, 3}, -1},
+        {{"A", "B", "G", "R"}, {4, 3, 2, 1}, 3},
+        {{"A", "Y"}, {2, 1}, 1},
+        {{"Z", "Y"}, {2}, -1},
+        {{"density"}, {1}, -1},
+        {{"A"}, {1}, 0},
+        {{"A", "albedo.R", "albedo.G", "albedo.B", "R", "G", "B", "Z"}, {5, 6, 7, 1}, 3}};
+    for (const ExrPrecision precision : {ExrPrecision::Float, ExrPrecision::Half})
+        for (const Case& c : cases) {
+            SCOPED_TRACE(testing::PrintToString(c.channels));
+            write_image(file("a.exr"), counted(c.channels), {.precision = precision});
+            const PixelBuffer pixels = read_pixels(file("a.exr"), false);
+            EXPECT_EQ(pixels.channels, int(c.values.size()));
+            EXPECT_EQ(pixels.alpha_channel, c.alpha);
+            std::visit(
+                [&](const auto& data) {
+                    EXPECT_EQ(std::vector<float>(data.begin(), data.end()), c.values);
+                },
+                pixels.data);
+        }
+    for (const auto& channels :
+         {std::vector<std::string>{"depth.Z", "image.R", "image.G", "image.B"}, {"r", "g", "b"}}) {
+        write_image(file("a.exr"), counted(channels));
+        const std::string why = error_of([&] { read_pixels(file("a.exr"), false); });
+        EXPECT_NE(why.find("a.exr\": the image has no channels R, G, B (it has: "),
+                  std::string::npos)
+            << why;
+    }
+}
+
 TEST_F(ImageIo, PfmRoundTrip) {
     for (const auto& channels :
          {std::vector<std::string>{"R", "G", "B"}, std::vector<std::string>{"Y"}}) {
@@ -233,6 +278,23 @@ TEST_F(ImageIo, SixteenBitsBecomeFloats) {
     const auto decoded = std::get<std::vector<float>>(read_pixels(path, false).data);
     EXPECT_NEAR(decoded[0], std::pow((32768 / 65535.0 + 0.055) / 1.055, 2.4), 1e-6);
     EXPECT_EQ(decoded[1], 1);
+}
+
+/// A PNG with the chunk gAMA for linear codes behind its header.
+std::string declared_linear(std::string png) {
+    constexpr size_t kAfterHeader = 8 + 25;
+    png.insert(kAfterHeader, std::string("\0\0\0\4gAMA\0\1\x86\xa0\x31\xe8\x96\x5f", 16));
+    return png;
+}
+
+TEST_F(ImageIo, GammaOfPngHasNoEffect) {
+    for (const std::string& png : {bytes(kRgbaPng), bytes(kGrey16Png)}) {
+        const std::string plain = write_bytes("a.png", png),
+                          linear = write_bytes("b.png", declared_linear(png));
+        EXPECT_EQ(read_image(linear).data, read_image(plain).data);
+        for (const bool raw : {false, true})
+            EXPECT_EQ(read_pixels(linear, raw).data, read_pixels(plain, raw).data);
+    }
 }
 
 /// Two rows of two pixels: red and green above, blue and half grey below.
