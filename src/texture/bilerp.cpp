@@ -20,7 +20,14 @@ public:
     Rgb eval(const TexturePoint& at) const override { return at_uv<Rgb>(at.uv); }
     bool has_jet() const override { return true; }
     RgbDual eval_jet(const TextureJetPoint& at) const override { return at_uv<RgbDual>(at.uv); }
-    Rgb mean() const override { return eval(Vec2{0.5f, 0.5f}); }
+    Rgb mean() const override {
+        constexpr int kGrid = 16;  // not one point: outside of the unit square, values end at 0
+        Rgb sum(0);
+        for (int i = 0; i < kGrid * kGrid; ++i)
+            sum += at_uv<Rgb>(
+                Vec2{(float(i % kGrid) + 0.5f) / kGrid, (float(i / kGrid) + 0.5f) / kGrid});
+        return sum / float(kGrid * kGrid);
+    }
     void resolution(int& width, int& height) const override { width = height = 16; }
 
 private:

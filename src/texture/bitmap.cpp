@@ -238,24 +238,59 @@ void BitmapTexture::resolution(int& width, int& height) const {
     options_.to_uv.resolution(width, height);
 }
 
-// Over the unit square of the image every texel has the same weight, for any filter and wrapping.
+bool BitmapTexture::covers_whole_periods() const {
+    const auto is_near = [](float a, float b) { return std::abs(a - b) < 1e-5f; };
+    const auto is_whole = [&](float x) { return is_near(x, std::round(x)); };
+    for (const int axis : {0, 1}) {
+        const auto interval = options_.to_uv.interval(axis);
+        if (!interval) return false;
+        const auto [start, length] = *interval;
+        if (!is_whole(length)) return false;
+        switch (axis == 0 ? options_.wrap : options_.wrap_v.value_or(options_.wrap)) {
+        case TextureWrap::Repeat: break;
+        case TextureWrap::Mirror:
+            // The image and its mirror image, or one of them from edge to edge.
+            if (!is_whole(length / 2) && !is_whole(start)) return false;
+            break;
+        default:
+            if (!is_near(std::min(start, start + length), 0) || !is_near(std::abs(length), 1))
+                return false;
+        }
+    }
+    return std::abs(options_.to_uv.determinant()) > 0.5f;  // not both axes along the same one
+}
+
 template <class Texels>
 Rgb BitmapTexture::image_mean(const Texels& texels) const {
-    double sum[3] = {};
-    const auto add = [&](Rgb c) {
-        for (int i = 0; i < 3; ++i) sum[i] += c[i];
+    const auto mean = [](int width, int height, const auto& value) {
+        double sum[3] = {};
+        for (int y = 0; y < height; ++y)
+            for (int x = 0; x < width; ++x) {
+                const Rgb c = value(x, y);
+                for (int i = 0; i < 3; ++i) sum[i] += c[i];
+            }
+        const double n = double(width) * height;
+        return Rgb(float(sum[0] / n), float(sum[1] / n), float(sum[2] / n));
     };
+    // Over the unit square of the image every texel has the same weight, for any filter and wrapping.
+    const auto of_image = [&] {
+        return mean(image_->width, image_->height,
+                    [&](int x, int y) { return texel(texels, x, y); });
+    };
+    if (covers_whole_periods()) return of_image();
     // Look-ups along each axis where `to_uv` maps the unit square to another part of the plane.
     constexpr int kGrid = 256;
-    const bool whole = options_.to_uv.is_identity();
-    const int width = whole ? image_->width : kGrid, height = whole ? image_->height : kGrid;
-    for (int y = 0; y < height; ++y)
-        for (int x = 0; x < width; ++x)
-            add(whole ? texel(texels, x, y)
-                      : filtered(texels, footprint(Vec2{(float(x) + 0.5f) / kGrid,
-                                                        (float(y) + 0.5f) / kGrid})));
-    const double n = double(width) * height;
-    return {float(sum[0] / n), float(sum[1] / n), float(sum[2] / n)};
+    Rgb c = mean(kGrid, kGrid, [&](int x, int y) {
+        return filtered(texels,
+                        footprint(Vec2{(float(x) + 0.5f) / kGrid, (float(y) + 0.5f) / kGrid}));
+    });
+    // They may miss small bright spots. Emitters, and lobes of materials, with a mean of zero would never be sampled.
+    if (c.r == 0 || c.g == 0 || c.b == 0) {
+        const Rgb whole = of_image();
+        for (int i = 0; i < 3; ++i)
+            if (c[i] == 0) c[i] = whole[i];
+    }
+    return c;
 }
 
 std::optional<BitmapFile> bitmap_file(const Params& params) {

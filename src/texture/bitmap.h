@@ -72,6 +72,8 @@ private:
     auto filtered(const Texels& texels, const Footprint<T>& f) const;
     template <class V>
     V gradient_at(V uv) const;
+    /// Whether `to_uv` maps the unit square to whole images, so that all texels have the same share of it.
+    bool covers_whole_periods() const;
     template <class Texels>
     Rgb image_mean(const Texels& texels) const;
 

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 #include "math/transform.h"
 
@@ -41,10 +43,18 @@ public:
         width = u;
         height = v;
     }
-    bool is_identity() const {
-        return m_[0][0] == 1 && m_[0][1] == 0 && m_[0][2] == 0 && m_[1][0] == 0 && m_[1][1] == 1 &&
-               m_[1][2] == 0;
+    /// The interval to which one axis of point(uv) is mapped by the unit square: its start, and its length, which is
+    /// negative where it is turned round. Nothing where the axis depends on both of u and v, or on none of them.
+    std::optional<std::array<float, 2>> interval(int axis) const {
+        constexpr float kRounding = 1e-6f;  // of a rotation by a right angle
+        const auto [by_u, by_v, start] = m_[axis];
+        const float least = std::min(std::abs(by_u), std::abs(by_v)),
+                    most = std::max(std::abs(by_u), std::abs(by_v));
+        if (!(least <= kRounding * most && most > 0)) return {};
+        return std::array{start, std::abs(by_u) > std::abs(by_v) ? by_u : by_v};
     }
+    /// Factor by which areas are multiplied; negative for a reflection.
+    float determinant() const { return m_[0][0] * m_[1][1] - m_[0][1] * m_[1][0]; }
 
 private:
     float m_[2][3] = {{1, 0, 0}, {0, 1, 0}};

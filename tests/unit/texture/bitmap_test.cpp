@@ -154,6 +154,69 @@ TEST(Bitmap, MeanIsTheAverageOfLookups) {
     }
 }
 
+/// A black image with one white pixel, which no coarse grid of look-ups meets.
+PixelBuffer with_one_dot(int size) {
+    std::vector<float> data(size_t(size) * size_t(size));
+    data[size_t(size) * size_t(size / 2) + size_t(size / 2)] = 1;
+    return float_pixels(size, size, 1, std::move(data));
+}
+
+TEST(Bitmap, MeanOfWholePeriodsIsExact) {
+    constexpr int kSize = 1024;
+    const PixelBuffer dot = with_one_dot(kSize);
+    const Transform flip = Transform::translate({0, 1, 0}) * Transform::scale({1, -1, 1}),
+                    quarter = Transform::rotate({0, 0, 1}, 90),
+                    moved = Transform::translate({0.3f, 0.7f, 0}) * Transform::scale({3, 2, 1});
+    for (const TextureFilter filter : {TextureFilter::Bilinear, TextureFilter::Nearest}) {
+        const auto mean = [&](const Transform& to_uv, TextureWrap wrap) {
+            const BitmapTexture texture(
+                dot, {.filter = filter, .wrap = wrap, .to_uv = UvTransform(to_uv)});
+            return texture.mean().r * kSize * kSize;
+        };
+        for (const TextureWrap wrap : {TextureWrap::Repeat, TextureWrap::Mirror, TextureWrap::Clamp,
+                                       TextureWrap::Zero, TextureWrap::One})
+            EXPECT_NEAR(mean(flip, wrap), 1, 1e-5) << int(wrap);
+        for (const TextureWrap wrap : {TextureWrap::Repeat, TextureWrap::Mirror}) {
+            EXPECT_NEAR(mean(quarter, wrap), 1, 1e-5) << int(wrap);
+            EXPECT_NEAR(mean(Transform::scale({3, 2, 1}), wrap), 1, 1e-5) << int(wrap);
+        }
+        EXPECT_NEAR(mean(moved, TextureWrap::Repeat), 1, 1e-5);
+    }
+    // Other parts of the plane are not the image: half of a mirrored one, or much of a constant edge.
+    const PixelBuffer two = float_pixels(2, 1, 1, {1, 3});
+    const auto mean_of_two = [&](const Transform& to_uv, TextureWrap wrap) {
+        return BitmapTexture(
+                   two,
+                   {.filter = TextureFilter::Nearest, .wrap = wrap, .to_uv = UvTransform(to_uv)})
+            .mean()
+            .r;
+    };
+    const Transform half = Transform::translate({0.5f, 0, 0}), twice = Transform::scale({2, 2, 1});
+    EXPECT_NEAR(mean_of_two(half, TextureWrap::Mirror), 3, 1e-5);
+    EXPECT_NEAR(mean_of_two(twice, TextureWrap::Clamp), 2.5f, 1e-5);
+    EXPECT_NEAR(mean_of_two(twice, TextureWrap::Zero), 0.5f, 1e-5);
+    EXPECT_NEAR(mean_of_two(half, TextureWrap::Repeat), 2, 1e-5);
+}
+
+// An emitter whose mean is zero gets no light path and no next event.
+TEST(Bitmap, MeanIsZeroOnlyWhereTheImageIs) {
+    constexpr int kSize = 1024;
+    const Transform to_uv = Transform::rotate({0, 0, 1}, 10) * Transform::scale({0.9f, 0.9f, 1});
+    const PixelBuffer dot = with_one_dot(kSize),
+                      black = float_pixels(2, 2, 1, std::vector<float>(4));
+    EXPECT_GT(BitmapTexture(dot, {.to_uv = UvTransform(to_uv)}).mean().r, 0);
+    EXPECT_EQ(BitmapTexture(black, {.to_uv = UvTransform(to_uv)}).mean(), Rgb(0));
+    // Every channel for itself.
+    std::vector<float> data(size_t(kSize) * kSize * 3);
+    for (size_t i = 0; i < data.size(); i += 3) data[i] = 1;
+    data[3 * (size_t(kSize) * (kSize / 2) + kSize / 2) + 2] = 1;
+    const Rgb mean =
+        BitmapTexture(float_pixels(kSize, kSize, 3, data), {.to_uv = UvTransform(to_uv)}).mean();
+    EXPECT_NEAR(mean.r, 1, 1e-5);
+    EXPECT_EQ(mean.g, 0);
+    EXPECT_GT(mean.b, 0);
+}
+
 TEST(Bitmap, DecodesByKindOfPixels) {
     // sRGB code 188 is 0.50289 linear; alpha and raw data are not decoded.
     const PixelBuffer codes = {.width = 1,
