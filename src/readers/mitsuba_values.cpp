@@ -10,6 +10,7 @@
 #include "color/srgb.h"
 #include "readers/file_bytes.h"
 #include "readers/line_ends.h"
+#include "readers/number_text.h"
 
 namespace etendue {
 namespace {
@@ -32,14 +33,14 @@ std::vector<std::string_view> split(std::string_view text, std::string_view sepa
     return tokens;
 }
 
-/// std::from_chars on all of `text`, which may also begin with '+'.
+/// parse_digits() on all of `text`, which may also begin with '+'.
 template <class T>
 T parse_number(std::string_view text, const char* expected, const SourceLocation& where) {
     std::string_view digits = trim(text);
     if (digits.size() > 1 && digits[0] == '+' && digits[1] != '-') digits.remove_prefix(1);
     T value{};
     const char* end = digits.data() + digits.size();
-    const auto [stop, error] = std::from_chars(digits.data(), end, value);
+    const auto [stop, error] = parse_digits(digits.data(), end, value);
     if (error == std::errc::result_out_of_range)
         throw SceneError(where, fmt::format("{} is out of range for {}", quote(text), expected));
     if (error != std::errc() || stop != end)

@@ -122,7 +122,7 @@ int make_scale(PbrtScene& scene, const PbrtArguments& args) {
     return texture;
 }
 
-int make_mix(PbrtScene& scene, const PbrtArguments& args) {
+int make_mixed_texture(PbrtScene& scene, const PbrtArguments& args) {
     const int texture = scene.add("texture", "mix", args.where());
     bind(scene, texture, "value0", args, "tex1", 0);
     bind(scene, texture, "value1", args, "tex2", 1);
@@ -237,7 +237,7 @@ const std::vector<PbrtEntry>& pbrt_textures() {
          {{"tex1", ParamKind::Texture, "0", "Value where amount is 0."},
           {"tex2", ParamKind::Texture, "1", "Value where amount is 1."},
           {"amount", ParamKind::Texture, "0.5", "Weight of tex2."}},
-         make_mix},
+         make_mixed_texture},
         {"checkerboard", kV3And4, "Becomes checkerboard, or checkerboard3d.",
          with_mapping({{"tex1", ParamKind::Texture, "1", "Value of the squares on the diagonal."},
                        {"tex2", ParamKind::Texture, "0", "Value of the other squares."},

@@ -9,6 +9,7 @@
 
 #include "description/source_location.h"
 #include "readers/line_ends.h"
+#include "readers/number_text.h"
 
 namespace etendue {
 
@@ -59,7 +60,9 @@ public:
         peek();
         const char* begin = at_ != end_ && *at_ == '+' ? at_ + 1 : at_;
         T value{};
-        const auto [stop, error] = std::from_chars(begin, end_, value);
+        const auto [stop, error] = parse_digits(begin, end_, value);
+        if (error == std::errc::result_out_of_range && ends_word(stop))
+            fail("the number " + std::string(word()) + " is out of range");
         if (error != std::errc() || !ends_word(stop) || !is_finite(value)) fail_number(expected);
         at_ = stop;
         return value;

@@ -11,6 +11,7 @@
 
 #include "description/scene_description.h"
 #include "readers/line_ends.h"
+#include "readers/number_text.h"
 
 namespace etendue {
 
@@ -114,7 +115,7 @@ private:
     template <class T>
     void parse(T& value, const char* what) {
         const char* begin = at_char('+') ? at_ + 1 : at_;
-        const auto [stop, error] = std::from_chars(begin, end_, value);
+        const auto [stop, error] = parse_digits(begin, end_, value);
         if (error == std::errc::result_out_of_range) fail(std::string(what) + " is out of range");
         if (error != std::errc{}) {
             const std::string_view found = word().substr(0, 40);

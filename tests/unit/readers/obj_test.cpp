@@ -108,10 +108,12 @@ TEST(Obj, LineEndings) {
 }
 
 TEST(Obj, NumbersInAllTheirForms) {
-    const MeshData m = parse_obj("v +1.5e+2 -.5 1E-3\nv 1e-42 1e-300 0\nv 0 1 0.\nf 1 2 3\n");
+    const MeshData m = parse_obj("v +1.5e+2 -.5 1E-3\nv 1e-42 1e-300 -1e-400\nv 0 1 0.\nf 1 2 3\n");
     EXPECT_EQ(m.positions[0], (Vec3{150, -0.5f, 1e-3f}));
     EXPECT_EQ(m.positions[1].y, 0);
+    EXPECT_EQ(m.positions[1].z, 0);
     EXPECT_EQ(m.positions[2].y, 1);
+    expect_scene_error(1, "is out of range", [] { parse_obj("v 1e400 0 0\n"); });
 }
 
 TEST(Obj, NormalsThatAreNotNumbersAreReplaced) {

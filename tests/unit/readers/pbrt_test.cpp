@@ -103,8 +103,24 @@ TEST(PbrtTokenizer, NamesWhatIsNoNumber) {
     expect_scene_error(1, "expected a number, found the string \"x\"", [&] { number("\"x\""); });
     expect_scene_error(1, "expected a number, found \"]\"", [&] { number("]"); });
     expect_scene_error(1, "found \"inf\"", [&] { number("inf"); });
+    expect_scene_error(1, "1e39 is out of range", [&] { number("1e39"); });
+    expect_scene_error(1, "-1e400 is out of range", [&] { number("-1e400"); });
+    expect_scene_error(1, "99999999999 is out of range",
+                       [&] { PbrtTokenizer("99999999999", file).number<int>("an integer"); });
     expect_scene_error(1, "expected a number, but the file ends", [&] { number(" "); });
     expect_scene_error(1, "no closing quote", [&] { PbrtTokenizer("\"x\n\n", file).string(); });
+}
+
+TEST(PbrtTokenizer, NumbersThatAreTooSmallAreZero) {
+    const FileName file = "f";
+    const std::string long_one = "0." + std::string(400, '0') + "1";
+    for (const std::string& text : {std::string("1e-46"), std::string("-1e-400"), long_one}) {
+        EXPECT_EQ(PbrtTokenizer(text, file).number<float>("a number"), 0) << text;
+        EXPECT_NEAR(PbrtTokenizer(text, file).number<double>("a number"), 0, 1e-45) << text;
+    }
+    EXPECT_EQ(PbrtTokenizer("1e-42", file).number<float>("a number"), 1e-42f);
+    const std::string huge = "1" + std::string(400, '0') + "e-400";
+    EXPECT_EQ(PbrtTokenizer(huge, file).number<float>("a number"), 1);
 }
 
 TEST(Pbrt, VersionIsThatOfTheEndOrOfTheFilm) {
