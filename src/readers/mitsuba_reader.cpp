@@ -72,6 +72,7 @@ SceneDescription MitsubaReader::read(std::string_view text) {
     read_document(text, scene_.file, root, nullptr);
     resolve_references();
     check_object_graph(scene_, kDeepestNesting);
+    set_spectra_of_textures();
     parameters_.check_overrides(scene_.file);
     return std::move(scene_);
 }

@@ -2,7 +2,9 @@
 // Implementation of mitsuba_xml.h: one object reads one scene.
 
 #include <array>
+#include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -95,9 +97,13 @@ private:
     void read_spectrum(const Element& e, const pugi::xml_node& node, Scope& scope);
     void read_transform(const Element& e, const pugi::xml_node& node, Scope& scope);
     void add_param(const Element& e, Scope& scope, ParamValue value);
-    Rgb spectrum_from_value(const Element& e, SpectrumRole role) const;
-    Rgb spectrum_from_plugin(const Element& e, const pugi::xml_node& node, const Scope& scope,
-                             SpectrumRole role);
+    using SpectrumOfRole = std::function<Rgb(SpectrumRole)>;
+    SpectrumOfRole spectrum_from_file(const Element& e, const pugi::xml_node& node);
+    SpectrumOfRole spectrum_from_value(const Element& e, const pugi::xml_node& node) const;
+    SpectrumOfRole spectrum_from_plugin(const Element& e, const pugi::xml_node& node,
+                                        const Scope& scope);
+    /// Gives the spectra of textures the role of what the textures are used for, which may stand behind them.
+    void set_spectra_of_textures();
 
     SourceLocation locate(const pugi::xml_node& node) const;
     [[noreturn]] void fail_text(const pugi::xml_node& text) const;
@@ -110,6 +116,12 @@ private:
     SceneDescription scene_;
     std::map<std::string, int> ids_;
     std::vector<Reference> references_;
+    struct TextureSpectrum {
+        int texture;
+        std::string name;
+        SpectrumOfRole colour;
+    };
+    std::vector<TextureSpectrum> texture_spectra_;
     std::vector<int> old_shapes_;  ///< Of the dialect of Mitsuba 0.6.
     Source* source_ = nullptr;
     std::vector<std::string> open_files_;  ///< The chain of includes.

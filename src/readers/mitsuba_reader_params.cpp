@@ -138,37 +138,44 @@ void MitsubaReader::read_spectrum(const Element& e, const pugi::xml_node& node, 
         return read_object(texture, node, scope);
     }
     const std::string name = source_->is_old() ? snake_case(e["name"]) : e["name"];
-    const SpectrumRole role = spectrum_role(scope.category, name, scope.in_emitter);
-    if (type) {
-        add_param(e, scope, spectrum_from_plugin(e, node, scope, role));
-        return;
-    }
-    check_leaf(node);
-    if (value) {
-        add_param(e, scope, spectrum_from_value(e, role));
-        return;
-    }
-    std::string path;
-    const std::string text = load(*file, e.where, path);
-    add_param(e, scope, spectrum_colour(parse_spectrum_file(text, path), role));
+    const SpectrumOfRole colour = type    ? spectrum_from_plugin(e, node, scope)
+                                  : value ? spectrum_from_value(e, node)
+                                          : spectrum_from_file(e, node);
+    add_param(e, scope, colour(spectrum_role(scope.category, name, scope.in_emitter)));
+    if (scope.category == "texture") texture_spectra_.push_back({scope.object, name, colour});
 }
 
-Rgb MitsubaReader::spectrum_from_value(const Element& e, SpectrumRole role) const {
+MitsubaReader::SpectrumOfRole MitsubaReader::spectrum_from_file(const Element& e,
+                                                                const pugi::xml_node& node) {
+    check_leaf(node);
+    std::string path;
+    const std::string text = load(e["filename"], e.where, path);
+    return [samples = parse_spectrum_file(text, path)](SpectrumRole role) {
+        return spectrum_colour(samples, role);
+    };
+}
+
+MitsubaReader::SpectrumOfRole MitsubaReader::spectrum_from_value(const Element& e,
+                                                                 const pugi::xml_node& node) const {
+    check_leaf(node);
     const std::string& value = e["value"];
     if (value.find(':') != value.npos)
-        return spectrum_colour(parse_spectrum_list(value, e.where), role);
+        return [samples = parse_spectrum_list(value, e.where)](SpectrumRole role) {
+            return spectrum_colour(samples, role);
+        };
     const std::vector<double> numbers = parse_floats(value, e.where);
     // A constant is grey in emitters too, a scaled D65, as in Mitsuba 0.6. Builds of Mitsuba 0.6 with three spectral
     // samples take three numbers as a colour.
     if (numbers.size() == 1 || (numbers.size() == 3 && source_->is_old()))
-        return to_rgb(parse_triple(value, e.where), e.where);
+        return [c = to_rgb(parse_triple(value, e.where), e.where)](SpectrumRole) { return c; };
     throw SceneError(
         e.where,
         fmt::format("expected one number or a list of wavelength:value, found {}", quote(value)));
 }
 
-Rgb MitsubaReader::spectrum_from_plugin(const Element& e, const pugi::xml_node& node,
-                                        const Scope& scope, SpectrumRole role) {
+MitsubaReader::SpectrumOfRole MitsubaReader::spectrum_from_plugin(const Element& e,
+                                                                  const pugi::xml_node& node,
+                                                                  const Scope& scope) {
     // The spectrum is read as a temporary object. It has no children, so it is still the last object afterwards.
     const int index = int(scene_.objects.size());
     scene_.objects.push_back({.category = "spectrum",
@@ -179,9 +186,41 @@ Rgb MitsubaReader::spectrum_from_plugin(const Element& e, const pugi::xml_node& 
                               .children = {}});
     Scope inner{index, "spectrum", scope.depth + 1, scope.in_emitter, {}};
     read_children(node, inner);
-    const SceneObject plugin = std::move(scene_.objects.back());
+    SceneObject plugin = std::move(scene_.objects.back());
     scene_.objects.pop_back();
-    return spectrum_plugin_colour(plugin, role);
+    return [plugin = std::move(plugin)](SpectrumRole role) {
+        return spectrum_plugin_colour(plugin, role);
+    };
+}
+
+void MitsubaReader::set_spectra_of_textures() {
+    if (texture_spectra_.empty()) return;
+    std::map<int, std::vector<std::pair<int, std::string>>> uses;  // as which parameter of what
+    for (size_t i = 0; i < scene_.objects.size(); ++i)
+        for (const auto& c : scene_.objects[i].children)
+            if (scene_.objects[size_t(c.object)].category == "texture")
+                uses[c.object].emplace_back(int(i), c.name);
+    std::map<int, std::optional<SpectrumRole>> known;
+    const std::function<std::optional<SpectrumRole>(int)> role_of =
+        [&](int texture) -> std::optional<SpectrumRole> {
+        const auto [entry, is_new] = known.try_emplace(texture);
+        if (!is_new) return entry->second;
+        std::optional<SpectrumRole> all;
+        for (const auto& [user, name] : uses[texture]) {
+            const std::string& category = scene_.objects[size_t(user)].category;
+            const std::optional<SpectrumRole> role =
+                category == "texture" && name != "scale"
+                    ? role_of(user)
+                    : spectrum_role(category, name, category == "emitter");
+            // Of several uses none may be cut off.
+            if (role) all = !all || all == role ? *role : SpectrumRole::Ratio;
+        }
+        return known[texture] = all;
+    };
+    for (const TextureSpectrum& s : texture_spectra_)
+        if (const auto role = role_of(s.texture); role && s.name != "scale")
+            for (Param& p : scene_.objects[size_t(s.texture)].params)
+                if (p.name == s.name) p.value = s.colour(*role);
 }
 
 void MitsubaReader::read_transform(const Element& e, const pugi::xml_node& node, Scope& scope) {

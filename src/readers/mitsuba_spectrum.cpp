@@ -87,9 +87,11 @@ Rgb regular(ParameterReader& params, SpectrumRole role, const SourceLocation& wh
 }  // namespace
 
 SpectrumRole spectrum_role(std::string_view category, std::string_view parameter, bool in_emitter) {
-    if (in_emitter) return SpectrumRole::Emission;
+    const bool is_factor = category == "texture" && parameter == "scale";
+    if (in_emitter && !is_factor) return SpectrumRole::Emission;
+    constexpr std::string_view kRatios[] = {"eta", "k", "int_ior", "ext_ior", "scale", "sigma_a"};
     const bool ratio =
-        parameter == "eta" || parameter == "k" || parameter == "int_ior" || parameter == "ext_ior";
+        std::find(std::begin(kRatios), std::end(kRatios), parameter) != std::end(kRatios);
     return (category == "bsdf" || category == "texture") && !ratio ? SpectrumRole::Reflectance
                                                                    : SpectrumRole::Ratio;
 }

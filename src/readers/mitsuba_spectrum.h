@@ -9,7 +9,7 @@ namespace etendue {
 enum class SpectrumRole {
     Emission,     ///< Radiance, irradiance, ...; no illuminant.
     Reflectance,  ///< A ratio in [0, 1], seen under D65.
-    Ratio,  ///< A ratio without an upper bound (such as an index of refraction), seen under D65.
+    Ratio,  ///< Without an upper bound (an index of refraction, a factor, absorption), seen under D65.
 };
 
 /// The role of a spectrum that is a parameter of an object of this category.

@@ -383,6 +383,57 @@ TEST(MitsubaXml, SpectraUseTheIlluminantOfTheirRole) {
     EXPECT_EQ(value_in<Rgb>(nested, "color0", 1), emitted);
 }
 
+// What a texture is used for may be known only behind it.
+TEST(MitsubaXml, SpectraOfSharedTexturesHaveTheRoleOfTheirUse) {
+    const std::string texture = R"(<texture type="checkerboard" id="t">
+        <spectrum name="color0" value="300:3, 900:3"/></texture>)";
+    const auto colour = [&](const std::string& uses) {
+        return value_in<Rgb>(parse_xml3(texture + uses), "color0");
+    };
+    const std::string lamp = R"(<emitter type="area"><ref id="t" name="radiance"/></emitter>)",
+                      wall = R"(<bsdf type="diffuse"><ref id="t" name="reflectance"/></bsdf>)",
+                      scaled = R"(<emitter type="area"><texture type="scale" name="radiance">
+                          <ref id="t"/></texture></emitter>)",
+                      absorbing = R"(<bsdf type="coating"><ref id="t" name="sigma_a"/></bsdf>)";
+    const Rgb emitted = value_in<Rgb>(
+        parse_xml3(
+            R"(<emitter type="area"><spectrum name="radiance" value="300:3, 900:3"/></emitter>)"),
+        "radiance");
+    EXPECT_EQ(colour(lamp), emitted);
+    EXPECT_EQ(colour(scaled), emitted);
+    EXPECT_EQ(colour(wall), Rgb(1));
+    EXPECT_EQ(colour(""), Rgb(1));
+    EXPECT_NEAR(colour(absorbing).g, 3, 0.02);
+    // A lamp keeps its radiance, though the wall has no more than one.
+    EXPECT_NEAR(colour(lamp + wall).g, 3, 0.02);
+    // A texture of an emitter that a material shares, and the dialect with other names.
+    const std::string both = R"(<emitter type="area">)" +
+                             std::string(texture).insert(9, "name=\"radiance\" ") + "</emitter>" +
+                             wall;
+    EXPECT_NEAR(value_in<Rgb>(parse_xml3(both), "color0", 1).g, 3, 0.02);
+    EXPECT_EQ(value_in<Rgb>(parse06(texture + lamp), "color0"), emitted);
+}
+
+TEST(MitsubaXml, FactorsAndAbsorptionHaveNoUpperBound) {
+    const auto scaled = parse_xml3(R"(<bsdf type="diffuse"><texture type="scale" name="reflectance">
+        <spectrum name="scale" value="300:3,900:3"/><texture type="checkerboard"/></texture></bsdf>)");
+    EXPECT_NEAR(value_in<Rgb>(scaled, "scale", 1).g, 3, 0.02);
+    const auto coated = parse_xml3(
+        R"(<bsdf type="coating"><spectrum name="sigma_a" value="300:2, 900:2"/></bsdf>)");
+    EXPECT_NEAR(value_in<Rgb>(coated, "sigma_a").g, 2, 0.02);
+}
+
+TEST(MitsubaXml, NumbersThatAreTooSmallAreZero) {
+    const auto scene = parse_xml3(R"(<bsdf type="b"><float name="a" value="1e-400"/>
+        <float name="b" value="-0.0000e-99999999999999999999"/><rgb name="c" value="1e-400 1e-46 1"/></bsdf>)");
+    EXPECT_EQ(value_in<double>(scene, "a"), 0);
+    EXPECT_EQ(value_in<double>(scene, "b"), 0);
+    EXPECT_EQ(value_in<Rgb>(scene, "c"), Rgb(0, 0, 1));
+    EXPECT_NE(error3(R"(<bsdf type="b"><float name="a" value="1e400"/></bsdf>)")
+                  .find("\"1e400\" is out of range for a number"),
+              std::string::npos);
+}
+
 TEST(MitsubaXml, ReadsSpectrumFilesAndPlugins) {
     const auto options =
         with_files({{"spd/a.spd", "# silver\n400 0.1\n\n500\t0.4 # peak\r\n700 0.2"}});
