@@ -230,6 +230,11 @@ size_t GltfBuffers::count(const JsonValue& accessor_index) const {
     return read_layout(accessor(accessor_index)).count;
 }
 
+bool GltfBuffers::has_bytes(const JsonValue& accessor_index) const {
+    const JsonValue& a = accessor(accessor_index);
+    return a["bufferView"] || a["sparse"];
+}
+
 void GltfBuffers::require_bytes(const JsonValue& accessor_index) const {
     const JsonValue& a = accessor(accessor_index);
     if (!a["bufferView"]) a.fail("has no bufferView");

@@ -46,6 +46,8 @@ public:
     }
     /// Number of elements of an accessor.
     size_t count(const JsonValue& accessor_index) const;
+    /// Whether the accessor names bytes, all of them or some.
+    bool has_bytes(const JsonValue& accessor_index) const;
     /// Fails where the accessor names no bytes, and its values would be zero.
     void require_bytes(const JsonValue& accessor_index) const;
     /// Values of unsigned integers.

@@ -91,12 +91,14 @@ std::optional<GltfReader::Primitive> GltfReader::read_primitive(const JsonValue&
     }
     if (primitive["targets"])
         warn(fmt::format("{}: morph targets have no effect", primitive.path()));
-    for (const std::string& extension : primitive["extensions"].members())
-        if (extension == "KHR_draco_mesh_compression") {
-            reject(primitive, fmt::format("{} is not supported", extension));
-            return {};
-        }
     const JsonValue attributes = primitive["attributes"];
+    // Where it is not required, the mesh may be there without compression, too.
+    constexpr const char* kDraco = "KHR_draco_mesh_compression";
+    if (primitive["extensions"][kDraco] &&
+        !(attributes["POSITION"] && buffers_.has_bytes(attributes["POSITION"]))) {
+        reject(primitive, fmt::format("{} is not supported", kDraco));
+        return {};
+    }
     if (!attributes["POSITION"]) {
         warn(fmt::format("{}: a mesh without positions is left out", primitive.path()));
         return {};

@@ -599,6 +599,22 @@ TEST(Gltf, ReadsTheContainer) {
     EXPECT_EQ(error_of(file.substr(0, 100)), "s.gltf: the file ends within a chunk");
 }
 
+TEST(Gltf, CompressedMeshesAreReadWhereTheyAreUncompressedAsWell) {
+    const auto mesh = [](const char* bytes_of_positions) {
+        return document(square(), fmt::format(
+                                      R"("extensionsUsed":["KHR_draco_mesh_compression"],
+            "accessors":[{{{}"componentType":5126,"type":"VEC3","count":4}},
+            {{"bufferView":1,"componentType":5123,"type":"SCALAR","count":6}}],
+            "bufferViews":[{{"buffer":0,"byteLength":48}},{{"buffer":0,"byteOffset":48,"byteLength":12}}],
+            "nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1,
+            "extensions":{{"KHR_draco_mesh_compression":{{"bufferView":0,"attributes":{{"POSITION":0}}}}}}}}]}}])",
+                                      bytes_of_positions));
+    };
+    EXPECT_EQ(error_of(mesh("\"bufferView\":0,"), square()), "");
+    EXPECT_EQ(error_of(mesh(""), square()),
+              "s.gltf: /meshes/0/primitives/0: KHR_draco_mesh_compression is not supported");
+}
+
 TEST(Gltf, ErrorsNameThePlace) {
     const Bytes b = square();
     const std::pair<std::string, const char*> cases[] = {
