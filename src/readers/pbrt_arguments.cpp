@@ -141,7 +141,14 @@ void PbrtArguments::check(const PbrtEntry& entry, PbrtVersion version,
             std::find_if(entry.params.begin(), entry.params.end(), [&](const PbrtParamInfo& p) {
                 return v.name == p.name && (p.versions & int(version));
             });
-        if (info == entry.params.end()) {
+        const bool is_known = info != entry.params.end();
+        // Colours of float textures are numbers.
+        const ParamKind kind = !is_known ? ParamKind::Object
+                               : info->kind == ParamKind::Rgb && kind_ == "float Texture"
+                                   ? ParamKind::Float
+                                   : info->kind;
+        if (v.is_default && !fits(v.type, kind)) continue;
+        if (!is_known) {
             std::vector<std::string> known;
             for (const PbrtParamInfo& p : entry.params)
                 if (p.versions & int(version)) known.emplace_back(p.name);
@@ -150,10 +157,10 @@ void PbrtArguments::check(const PbrtEntry& entry, PbrtVersion version,
                    hint(v.name, known));
             continue;
         }
-        if (!fits(v.type, info->kind))
+        if (!fits(v.type, kind))
             throw SceneError(
                 v.where, fmt::format("parameter \"{}\" of {} {} must be {}, not of type {}", v.name,
-                                     kind_, quote(name_), wanted(info->kind), type_name(v.type)));
+                                     kind_, quote(name_), wanted(kind), type_name(v.type)));
         if (v.size() == 0)
             throw SceneError(v.where, fmt::format("parameter \"{}\" has no value", v.name));
         if (std::any_of(values_.begin(), values_.begin() + ptrdiff_t(kept),
@@ -167,7 +174,7 @@ void PbrtArguments::check(const PbrtEntry& entry, PbrtVersion version,
 
 void PbrtArguments::add_defaults(const std::vector<PbrtValue>& values) {
     for (const PbrtValue& v : values)
-        if (!has(v.name)) values_.push_back(v);
+        if (!has(v.name)) values_.emplace_back(v).is_default = true;
 }
 
 const PbrtValue* PbrtArguments::find(std::string_view name) const {

@@ -37,6 +37,7 @@ struct PbrtValue {
     std::vector<float> numbers;
     std::vector<int> integers;  ///< of Integer and Bool
     std::vector<std::string> strings;
+    bool is_default = false;  ///< Of Attribute, for whatever has such a parameter.
 
     size_t size() const { return numbers.size() + integers.size() + strings.size(); }
 };
@@ -85,7 +86,7 @@ public:
     PbrtPlace where() const { return where_; }
     const std::vector<PbrtValue>& values() const { return values_; }
 
-    /// Drops what the table does not have, after `reject` was told; throws where a type does not fit.
+    /// Drops what the table does not have, after `reject` was told unless it is a default; throws where a type does not fit.
     void check(const PbrtEntry& entry, PbrtVersion version,
                const std::function<void(const SourceLocation&, const std::string& what,
                                         const std::string& more)>& reject);

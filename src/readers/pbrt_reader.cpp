@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
@@ -167,6 +168,7 @@ void PbrtReader::read_directive(PbrtTokenizer& in, std::string_view word) {
         in.fail(fmt::format("{} is a directive of pbrt-v{}, but this is a scene of pbrt-v{}", word,
                             it->versions == kV3 ? 3 : 4, scene_.is_v3() ? 3 : 4));
     (this->*it->read)(in);
+    for (; !ready_.empty(); ready_.pop_front()) make_waiting(std::move(ready_.front()), true);
 }
 
 /// pbrt includes text: the parameters of a directive may go on behind the Include of the file in which it begins.
@@ -177,10 +179,15 @@ void PbrtReader::include(PbrtTokenizer& in) {
     in.include(plain_text(open_files_.back().text, name.str()), name);
 }
 
-/// What is imported is complete.
+/// What is imported is complete, and its graphics state ends with it.
 void PbrtReader::import(PbrtTokenizer& in) {
     const OpenFile file = load_included(in);
+    const PbrtState state = scene_.state;
+    const size_t outer = std::exchange(first_saved_, stack_.size());
     read_file(file.text, file.path);
+    check_all_closed();
+    first_saved_ = outer;
+    scene_.state = state;
 }
 
 PbrtReader::OpenFile PbrtReader::load_included(PbrtTokenizer& in) {
@@ -238,6 +245,51 @@ int PbrtReader::make(PbrtArguments& args, const std::vector<PbrtEntry>& table,
                    scene_.reject(where, what, more);
                });
     return it->make(scene_, args);
+}
+
+// ---- Names that are defined later
+
+std::string PbrtReader::missing_name(const PbrtArguments& args, bool is_shape) const {
+    if (scene_.is_v3()) return {};
+    for (const PbrtValue& v : args.values()) {
+        if (v.type == PbrtType::Texture)
+            for (const std::string& name : v.strings)
+                if (!scene_.float_textures.contains(name) &&
+                    !scene_.spectrum_textures.contains(name))
+                    return "texture " + name;
+        if (v.name == "materials")  // of a mixture
+            for (const std::string& name : v.strings)
+                if (!scene_.named_materials.contains(name)) return "material " + name;
+    }
+    const std::string& material = scene_.state.named_material.str();
+    return is_shape && !material.empty() && !scene_.named_materials.contains(material)
+               ? "material " + material
+               : "";
+}
+
+void PbrtReader::make_when_defined(PbrtArguments args, bool is_shape,
+                                   std::function<void(PbrtArguments&)> make) {
+    if (missing_name(args, is_shape).empty()) return make(args);
+    make_waiting({++order_, scene_.state, scene_.group, is_shape, std::move(args), std::move(make)},
+                 true);
+}
+
+void PbrtReader::make_waiting(Waiting what, bool may_wait) {
+    PbrtState state = std::exchange(scene_.state, what.state);
+    const int group = std::exchange(scene_.group, what.group);
+    if (std::string name = may_wait ? missing_name(what.args, what.is_shape) : ""; !name.empty())
+        waiting_[std::move(name)].push_back(std::move(what));
+    else
+        what.make(what.args);
+    scene_.state = std::move(state);
+    scene_.group = group;
+}
+
+void PbrtReader::make_all_waiting() {
+    std::map<int, Waiting> in_order;
+    for (auto& [name, all] : waiting_)
+        for (Waiting& w : all) in_order.emplace(w.order, std::move(w));
+    for (auto& [order, w] : in_order) make_waiting(std::move(w), false);
 }
 
 // ---- Transforms
@@ -313,16 +365,47 @@ void PbrtReader::transform_times(PbrtTokenizer& in) {
 void PbrtReader::push(const char* what, PbrtPlace where) {
     if (stack_.size() >= kDeepestNesting)
         throw SceneError(where, fmt::format("{} nests more than {} deep", what, kDeepestNesting));
-    stack_.push_back({what, where, scene_.state});
+    stack_.push_back({what, where, scene_.state, hidden_.size()});
 }
 
 void PbrtReader::pop(const char* what, const char* closing, PbrtPlace where) {
-    if (stack_.empty()) throw SceneError(where, fmt::format("{} without {}", closing, what));
+    if (stack_.size() == first_saved_)
+        throw SceneError(where, fmt::format("{} without {}", closing, what));
     const Saved& last = stack_.back();
     if (std::string_view(last.what) != what)
         throw SceneError(where,
                          fmt::format("{}, but the last thing opened is the {} at {}:{}", closing,
                                      last.what, last.where.file->str(), last.where.line));
+}
+
+void PbrtReader::restore() {
+    scene_.state = std::move(stack_.back().state);
+    for (; hidden_.size() > stack_.back().hidden; hidden_.pop_back()) {
+        const HiddenName& last = hidden_.back();
+        if (last.object)
+            (*last.names)[last.name] = *last.object;
+        else
+            last.names->erase(last.name);
+    }
+    stack_.pop_back();
+}
+
+void PbrtReader::check_all_closed() const {
+    if (stack_.size() > first_saved_)
+        throw SceneError(stack_.back().where,
+                         fmt::format("{} is never closed", stack_.back().what));
+}
+
+void PbrtReader::define(std::map<std::string, int>& names, const std::string& name, int object) {
+    const auto [it, is_new] = names.try_emplace(name, object);
+    if (scene_.is_v3() && !stack_.empty())
+        hidden_.push_back({&names, name, is_new ? std::nullopt : std::optional(it->second)});
+    it->second = object;
+    const char* kind = &names == &scene_.named_materials ? "material " : "texture ";
+    if (const auto waiting = waiting_.find(kind + name); waiting != waiting_.end()) {
+        std::move(waiting->second.begin(), waiting->second.end(), std::back_inserter(ready_));
+        waiting_.erase(waiting);
+    }
 }
 
 void PbrtReader::attribute_begin(PbrtTokenizer& in) {
@@ -331,8 +414,7 @@ void PbrtReader::attribute_begin(PbrtTokenizer& in) {
 
 void PbrtReader::attribute_end(PbrtTokenizer& in) {
     pop("AttributeBegin", "AttributeEnd", in.where());
-    scene_.state = std::move(stack_.back().state);
-    stack_.pop_back();
+    restore();
 }
 
 void PbrtReader::transform_begin(PbrtTokenizer& in) {
@@ -408,12 +490,14 @@ void PbrtReader::texture(PbrtTokenizer& in) {
         throw SceneError(
             where, fmt::format("a texture is of the type float or spectrum, not {}", quote(type)));
     PbrtArguments args = arguments(in, is_float ? "float Texture" : "spectrum Texture", "texture");
-    int object = make(args, pbrt_textures(), "a constant of 0.5");
-    if (object < 0) {
-        object = scene_.add("texture", "constant", args.where());
-        scene_.set(object, "value", Rgb(0.5f));
-    }
-    (is_float ? scene_.float_textures : scene_.spectrum_textures)[name] = object;
+    make_when_defined(std::move(args), false, [this, name, is_float](PbrtArguments& a) {
+        int object = make(a, pbrt_textures(), "a constant of 0.5");
+        if (object < 0) {
+            object = scene_.add("texture", "constant", a.where());
+            scene_.set(object, "value", Rgb(0.5f));
+        }
+        define(is_float ? scene_.float_textures : scene_.spectrum_textures, name, object);
+    });
 }
 
 int PbrtReader::make_material(PbrtArguments& args) {
@@ -425,25 +509,37 @@ int PbrtReader::make_material(PbrtArguments& args) {
 
 void PbrtReader::material(PbrtTokenizer& in) {
     PbrtArguments args = arguments(in, "Material", "material");
-    scene_.state.material = make_material(args);
     scene_.state.named_material = {};
+    if (missing_name(args, false).empty()) {
+        scene_.state.material = make_material(args);
+        return;
+    }
+    // Shapes wait for it under a name that no file has.
+    const std::string name = fmt::format("{}material {}", '\0', order_);
+    scene_.state.named_material = name;
+    make_when_defined(std::move(args), false, [this, name](PbrtArguments& a) {
+        define(scene_.named_materials, name, make_material(a));
+    });
 }
 
 void PbrtReader::make_named_material(PbrtTokenizer& in) {
     const PbrtArguments args = arguments(in, "MakeNamedMaterial", "material");
-    PbrtArguments typed = take_type(args, "Material");
-    const int object = make_material(typed);
-    scene_.named_materials[args.name()] = object;
+    make_when_defined(take_type(args, "Material"), false,
+                      [this, name = args.name()](PbrtArguments& a) {
+                          define(scene_.named_materials, name, make_material(a));
+                      });
 }
 
 void PbrtReader::named_material(PbrtTokenizer& in) {
     scene_.state.material_where = in.where();
     const std::string name = unescape(in.string());
+    if (scene_.is_v3()) {
+        scene_.state.material = scene_.named_material(name, scene_.state.material_where);
+        return;
+    }
     scene_.state.named_material = name;
     // pbrt-v4 may define the material later.
-    if (scene_.is_v3())
-        scene_.current_material();
-    else if (!scene_.named_materials.contains(name))
+    if (!scene_.named_materials.contains(name))
         not_yet_made_.emplace_back(name, scene_.state.material_where);
 }
 
@@ -471,8 +567,8 @@ void PbrtReader::area_light_source(PbrtTokenizer& in) {
 }
 
 void PbrtReader::shape(PbrtTokenizer& in) {
-    PbrtArguments args = arguments(in, "Shape", "shape");
-    make(args, pbrt_shapes(), "nothing");
+    make_when_defined(arguments(in, "Shape", "shape"), true,
+                      [this](PbrtArguments& a) { make(a, pbrt_shapes(), "nothing"); });
 }
 
 void PbrtReader::object_begin(PbrtTokenizer& in) {
@@ -489,8 +585,7 @@ void PbrtReader::object_begin(PbrtTokenizer& in) {
 
 void PbrtReader::object_end(PbrtTokenizer& in) {
     pop("ObjectBegin", "ObjectEnd", in.where());
-    scene_.state = std::move(stack_.back().state);
-    stack_.pop_back();
+    restore();
     scene_.group = -1;
 }
 
@@ -502,7 +597,6 @@ void PbrtReader::object_instance(PbrtTokenizer& in) {
     if (it == scene_.objects.end())
         throw SceneError(where, fmt::format("there is no object {}{}", quote(name),
                                             hint(name, names_of(scene_.objects))));
-    if (scene_.object(it->second).children.empty()) return;
     const int instance = scene_.add("shape", "instance", where);
     scene_.set(instance, "to_world", scene_.state.ctm);
     scene_.add_child(instance, "", it->second);
@@ -592,10 +686,13 @@ void PbrtReader::make_view() {
 
 void PbrtReader::finish(const SourceLocation& end) {
     if (!in_world_) throw SceneError(end, "the scene has no WorldBegin");
-    if (!stack_.empty())
-        throw SceneError(stack_.back().where,
-                         fmt::format("{} is never closed", stack_.back().what));
+    check_all_closed();
     for (const auto& [name, where] : not_yet_made_) scene_.named_material(name, where);
+    make_all_waiting();
+    std::erase_if(scene_.description.roots, [&](int root) {
+        const SceneObject& o = scene_.object(root);
+        return o.type == "instance" && scene_.object(o.children[0].object).children.empty();
+    });
     constexpr int kDeepestObjects = 64;
     check_object_graph(scene_.description, kDeepestObjects);
 }

@@ -2,6 +2,9 @@
 // The machine behind pbrt.h: one object reads one scene, directive by directive.
 
 #include <deque>
+#include <functional>
+#include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -87,6 +90,29 @@ private:
     int make_material(PbrtArguments& args);
     void push(const char* what, PbrtPlace where);
     void pop(const char* what, const char* closing, PbrtPlace where);
+    /// Something that needs a name which pbrt-v4 may define later, with the state in which it is to be made.
+    struct Waiting {
+        int order;  ///< In the file.
+        PbrtState state;
+        int group;
+        bool is_shape;
+        PbrtArguments args;
+        std::function<void(PbrtArguments&)> make;
+    };
+    /// Makes something from arguments: now, or as soon as the names are defined that it needs.
+    void make_when_defined(PbrtArguments args, bool is_shape,
+                           std::function<void(PbrtArguments&)> make);
+    void make_waiting(Waiting what, bool may_wait);
+    /// At the end of the scene: what waits in vain reports an error.
+    void make_all_waiting();
+    /// A texture or material that the arguments, or a shape, need, and that is not defined yet; "" if there is none. None
+    /// in pbrt-v3, where names must be defined before.
+    std::string missing_name(const PbrtArguments& args, bool is_shape) const;
+    /// Restores what the last push() saved, and in pbrt-v3 the names that were given since then.
+    void restore();
+    void check_all_closed() const;
+    /// Gives a name to an object: in pbrt-v3 until the end of the attributes, in pbrt-v4 for all that follows.
+    void define(std::map<std::string, int>& names, const std::string& name, int object);
     void make_view();
     void finish(const SourceLocation& end);
 
@@ -94,10 +120,23 @@ private:
         const char* what;  ///< "AttributeBegin", ...
         PbrtPlace where;
         PbrtState state;
+        size_t hidden;  ///< Size of hidden_.
+    };
+    /// What a name stood for before it was given again; nothing if it was new.
+    struct HiddenName {
+        std::map<std::string, int>* names;
+        std::string name;
+        std::optional<int> object;
     };
 
     PbrtScene scene_;
     std::vector<Saved> stack_;
+    size_t first_saved_ =
+        0;  ///< The first element of the stack that belongs to the file that is being imported.
+    std::vector<HiddenName> hidden_;
+    std::map<std::string, std::vector<Waiting>> waiting_;  ///< By the name that they need.
+    std::deque<Waiting> ready_;
+    int order_ = 0;
     std::map<std::string, Transform> coordinate_systems_;
     std::vector<std::pair<std::string, PbrtPlace>> not_yet_made_;  ///< Of NamedMaterial.
     PbrtArguments camera_, film_, filter_, sampler_, integrator_;

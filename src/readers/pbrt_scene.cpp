@@ -73,6 +73,13 @@ int PbrtScene::texture(const PbrtArguments& args, std::string_view name, bool is
                         : hint(id, names_of(textures))));
 }
 
+bool PbrtScene::is_float(const PbrtArguments& args, std::string_view name) const {
+    const PbrtValue* v = args.find(name);
+    if (!v || v->type != PbrtType::Texture) return v && v->type == PbrtType::Float;
+    const std::string id = args.text(name, "");
+    return float_textures.contains(id) || !spectrum_textures.contains(id);
+}
+
 std::optional<Rgb> PbrtScene::constant(const PbrtArguments& args, std::string_view name,
                                        Rgb fallback, PbrtSpectrum kind) const {
     if (const int t = texture(args, name, false); t >= 0) {

@@ -52,6 +52,8 @@ public:
                                   float fallback) const;
     /// The texture object that a parameter names; -1 where it is absent or no texture.
     int texture(const PbrtArguments& args, std::string_view name, bool is_float) const;
+    /// Whether a parameter is a number, or a texture of which there is one of floats or none.
+    bool is_float(const PbrtArguments& args, std::string_view name) const;
     /// Gives parameter `to` of an object the value of `name`: colour, number or texture.
     void bind(int object, const char* to, const PbrtArguments& args, const char* name, Rgb fallback,
               PbrtSpectrum kind = PbrtSpectrum::Albedo);

@@ -95,30 +95,43 @@ int make_imagemap(PbrtScene& scene, const PbrtArguments& args) {
     return inverted;
 }
 
+/// A texture times a number that varies: a mixture with black, of which the weight is the value of a float texture.
+int scale_by_float_texture(PbrtScene& scene, const PbrtArguments& args, const char* value,
+                           const char* factor) {
+    const int texture = scene.add("texture", "mix", args.where());
+    scene.set(texture, "value0", Rgb(0));
+    bind(scene, texture, "value1", args, value, 1);
+    scene.bind_float(texture, "weight", args, factor, 1);
+    return texture;
+}
+
 int make_scale(PbrtScene& scene, const PbrtArguments& args) {
+    const bool floats = is_float(args);
     const char* names[2] = {scene.is_v3() || args.has("tex1") ? "tex1" : "tex",
                             scene.is_v3() || args.has("tex2") ? "tex2" : "scale"};
-    const bool floats = is_float(args);
-    const auto constant = [&](const char* name) -> std::optional<Rgb> {
-        if (!floats) return scene.constant(args, name, Rgb(1), PbrtSpectrum::Unbounded);
-        if (const int t = scene.texture(args, name, true);
-            t >= 0 && scene.object(t).type != "constant")
-            return {};
-        return Rgb(*scene.constant(args, name, 1.0f));
+    // The factor of pbrt-v4 is a float, also of spectra. A spectrum is taken as well where there is no such float.
+    const bool is_factor_float = floats || (!scene.is_v3() && scene.is_float(args, names[1]));
+    const auto constant = [&](const char* name, bool is_float) -> std::optional<Rgb> {
+        if (!is_float) return scene.constant(args, name, Rgb(1), PbrtSpectrum::Unbounded);
+        if (const auto x = scene.constant(args, name, 1.0f)) return Rgb(*x);
+        return {};
     };
-    const std::optional<Rgb> a = constant(names[0]), b = constant(names[1]);
+    const std::optional<Rgb> a = constant(names[0], floats),
+                             b = constant(names[1], is_factor_float);
     if (a && b) {
         const int product = scene.add("texture", "constant", args.where());
         scene.set(product, "value", *a * *b);
         return product;
     }
+    if (is_factor_float && !floats && !b)
+        return scale_by_float_texture(scene, args, names[0], names[1]);
     const int texture = scene.add("texture", "scale", args.where());
     // The value of a product is the texture of the two.
     bind(scene, texture, "value", args, names[a ? 1 : 0], 1);
-    if (floats || !a)
-        bind(scene, texture, "scale", args, names[a ? 0 : 1], 1);
+    if (const auto factor = a ? a : b)
+        scene.set(texture, "scale", *factor);
     else
-        scene.set(texture, "scale", *a);
+        bind(scene, texture, "scale", args, names[1], 1);
     return texture;
 }
 
@@ -225,9 +238,9 @@ const std::vector<PbrtEntry>& pbrt_textures() {
          make_constant},
         {"scale",
          kV3And4,
-         "Becomes scale.",
+         "Becomes scale; in v4, of a spectrum and a float texture, mix.",
          {{"tex", ParamKind::Texture, "1", "First factor.", kV4},
-          {"scale", ParamKind::Texture, "1", "Second factor.", kV4},
+          {"scale", ParamKind::Texture, "1", "Second factor; a float.", kV4},
           {"tex1", ParamKind::Texture, "1", "First factor."},
           {"tex2", ParamKind::Texture, "1", "Second factor."}},
          make_scale},
@@ -245,10 +258,10 @@ const std::vector<PbrtEntry>& pbrt_textures() {
                        {"aamode", ParamKind::String, "", "Accepted; without effect.", kV3}}),
          make_checkerboard},
         {"bilerp", kV3And4, "Becomes bilerp.",
-         with_mapping({{"v00", ParamKind::Texture, "0", "Value at (0, 0)."},
-                       {"v01", ParamKind::Texture, "1", "Value at (0, 1)."},
-                       {"v10", ParamKind::Texture, "0", "Value at (1, 0)."},
-                       {"v11", ParamKind::Texture, "1", "Value at (1, 1)."}}),
+         with_mapping({{"v00", ParamKind::Rgb, "0", "Value at (0, 0)."},
+                       {"v01", ParamKind::Rgb, "1", "Value at (0, 1)."},
+                       {"v10", ParamKind::Rgb, "0", "Value at (1, 0)."},
+                       {"v11", ParamKind::Rgb, "1", "Value at (1, 1)."}}),
          make_bilerp},
         {"dots", kV3And4, "Becomes dots, in places of etendue's own.",
          with_mapping({{"inside", ParamKind::Texture, "1", "Value of the dots."},

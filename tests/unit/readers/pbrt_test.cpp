@@ -193,6 +193,119 @@ TEST(Pbrt, AttributeGivesDefaults) {
     EXPECT_EQ(value<double>(find(scene, "shape", 1), "radius"), 2);
 }
 
+// What an object does not have does not concern it.
+TEST(Pbrt, DefaultsConcernWhatHasThem) {
+    const auto scene = parse4("Attribute \"shape\" \"float radius\" 2 \"string alpha\" \"no\"\n"
+                              "Attribute \"material\" \"float roughness\" 0.1\n"
+                              "Material \"diffuse\"\n"
+                              "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0]\n" +
+                              std::string(kSphere));
+    EXPECT_EQ(find(scene, "shape").type, "mesh");
+    EXPECT_EQ(value<double>(find(scene, "shape", 1), "radius"), 2);
+    expect_scene_error(3, "has no parameter \"radius\"", [] {
+        parse4("Attribute \"shape\" \"float radius\" 2\n"
+               "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"float radius\" 1");
+    });
+}
+
+TEST(Pbrt, NamesOfV3EndWithTheirAttributes) {
+    const std::string text =
+        "Texture \"t\" \"color\" \"constant\" \"rgb value\" [.9 .1 .1]\n"
+        "MakeNamedMaterial \"m\" \"string type\" \"matte\" \"rgb Kd\" [.9 .1 .1]\n"
+        "OPEN\n"
+        "Texture \"t\" \"color\" \"constant\" \"rgb value\" [.1 .1 .9]\n"
+        "MakeNamedMaterial \"m\" \"string type\" \"matte\" \"rgb Kd\" [.1 .1 .9]\n"
+        "CLOSE\n"
+        "NamedMaterial \"m\" Shape \"sphere\"\n"
+        "Material \"matte\" \"texture Kd\" \"t\" Shape \"sphere\"\n";
+    const auto with = [&](const std::string& open, const std::string& close) {
+        std::string all = text;
+        all.replace(all.find("OPEN"), 4, open);
+        all.replace(all.find("CLOSE"), 5, close);
+        return all;
+    };
+    const auto colours = [](const SceneDescription& scene) {
+        std::vector<Rgb> found;
+        for (int i = 0; i < 2; ++i) {
+            const SceneObject& outer = child(scene, find(scene, "shape", i), "bsdf");
+            found.push_back(value<Rgb>(
+                outer.type == "twosided" ? child(scene, outer, "bsdf") : outer, "reflectance"));
+        }
+        return found;
+    };
+    const Rgb outer(0.9f, 0.1f, 0.1f), inner(0.1f, 0.1f, 0.9f);
+    EXPECT_EQ(colours(parse_pbrt3(with("AttributeBegin", "AttributeEnd"))),
+              (std::vector<Rgb>{outer, outer}));
+    EXPECT_EQ(colours(parse_pbrt3(with("ObjectBegin \"o\"", "ObjectEnd"))),
+              (std::vector<Rgb>{outer, outer}));
+    EXPECT_EQ(colours(parse_pbrt3(with("TransformBegin", "TransformEnd"))),
+              (std::vector<Rgb>{inner, inner}));
+    // A name that is new within the attributes is unknown behind them.
+    expect_scene_error(4, "there is no named material \"m\"", [] {
+        parse_pbrt3("AttributeBegin\nMakeNamedMaterial \"m\" \"string type\" \"matte\"\n"
+                    "AttributeEnd NamedMaterial \"m\"");
+    });
+    // A material is that of the name where it is chosen.
+    const auto chosen =
+        parse_pbrt3("MakeNamedMaterial \"m\" \"string type\" \"matte\" \"rgb Kd\" [.9 .1 .1]\n"
+                    "NamedMaterial \"m\"\n"
+                    "MakeNamedMaterial \"m\" \"string type\" \"matte\" \"rgb Kd\" [.1 .1 .9]\n" +
+                    std::string(kSphere));
+    EXPECT_EQ(value<Rgb>(material(chosen), "reflectance"), outer);
+    // Names of v4 hold in the whole scene.
+    const auto v4 = parse4("AttributeBegin\n"
+                           "MakeNamedMaterial \"m\" \"string type\" \"conductor\"\n"
+                           "AttributeEnd NamedMaterial \"m\"\n" +
+                           std::string(kSphere));
+    EXPECT_EQ(material(v4).type, "conductor");
+}
+
+// Names of v4 may be used before they are defined, with the graphics state of where they are used.
+TEST(Pbrt, NamesOfV4MayBeDefinedLater) {
+    const std::string red = "Texture \"t\" \"spectrum\" \"constant\" \"rgb value\" [1 0 0]\n";
+    const auto named =
+        parse4("NamedMaterial \"a\"\nAttributeBegin Translate 0 0 5 " + std::string(kSphere) +
+               "AttributeEnd\nMakeNamedMaterial \"a\" \"string type\" \"conductor\"");
+    EXPECT_EQ(material(named).type, "conductor");
+    expect_near(transformed(to_world(named), {0, 0, 0}), {0, 0, 5});
+    const auto textured = parse4("Material \"diffuse\" \"texture reflectance\" \"t\"\n" +
+                                 std::string(kSphere) + red + kSphere);
+    ASSERT_EQ(std::count_if(textured.roots.begin(), textured.roots.end(),
+                            [&](int r) { return textured.objects[r].category == "shape"; }),
+              2);
+    EXPECT_EQ(value<Rgb>(material(textured), "reflectance"), Rgb(1, 0, 0));
+    EXPECT_EQ(find(textured, "shape").children[0].object,
+              find(textured, "shape", 1).children[0].object);
+    // A chain: a mixture of a material with a texture that is scaled by another one.
+    const auto chain =
+        parse4("Material \"mix\" \"string materials\" [\"a\" \"b\"]\n" + std::string(kSphere) +
+               "MakeNamedMaterial \"b\" \"string type\" \"diffuse\" \"texture reflectance\" \"p\"\n"
+               "MakeNamedMaterial \"a\" \"string type\" \"conductor\"\n"
+               "Texture \"p\" \"spectrum\" \"scale\" \"texture tex\" \"t\" \"float scale\" 0.5\n" +
+               red);
+    EXPECT_EQ(material(chain).type, "blendbsdf");
+    // In an object; an instance of an empty one is left out.
+    const auto object = parse4("ObjectBegin \"o\" NamedMaterial \"a\" " + std::string(kSphere) +
+                               "ObjectEnd ObjectInstance \"o\"\n"
+                               "ObjectBegin \"none\" ObjectEnd ObjectInstance \"none\"\n"
+                               "MakeNamedMaterial \"a\" \"string type\" \"interface\"");
+    const SceneObject& instance = find(object, "shape");
+    EXPECT_EQ(child(object, child(object, instance, "shape"), "shape").type, "sphere");
+    EXPECT_THROW(find(object, "shape", 1), std::runtime_error);
+    // What nobody defines is reported where it is first needed.
+    expect_scene_error(2, "there is no spectrum texture \"t\"", [] {
+        parse4("Material \"diffuse\" \"texture reflectance\" \"t\"\n" + std::string(kSphere) +
+               "Shape \"sphere\" \"texture alpha\" \"u\"");
+    });
+    expect_scene_error(2, "mixes \"a\", which is no named material", [] {
+        parse4("Material \"mix\" \"string materials\" [\"a\" \"b\"]\n" + std::string(kSphere));
+    });
+    expect_scene_error(2, "there is no spectrum texture \"t\"", [&] {
+        parse_pbrt3("Material \"matte\" \"texture Kd\" \"t\"\n"
+                    "Texture \"t\" \"color\" \"constant\"");
+    });
+}
+
 TEST(Pbrt, ObjectsBecomeGroupsAndInstances) {
     const auto scene = parse4("ObjectBegin \"o\" Translate 1 0 0\n" + std::string(kSphere) +
                               "ObjectEnd\nTranslate 0 1 0 ObjectInstance \"o\"");
@@ -213,6 +326,25 @@ TEST(Pbrt, IncludesFilesInPlace) {
     expect_scene_error(2, "unknown directive \"Bad\"", [] {
         parse_pbrt("WorldBegin Include \"b.pbrt\"\n", "a.pbrt", with_files({{"b.pbrt", "\nBad"}}));
     });
+}
+
+// What is imported is complete, and leaves the graphics state as it was.
+TEST(Pbrt, ImportsKeepTheirStateToThemselves) {
+    const auto import = [](const std::string& text, const std::string& before = "") {
+        return parse_pbrt("WorldBegin\n" + before + "Import \"b.pbrt\"\n" + kSphere, "a.pbrt",
+                          with_files({{"b.pbrt", text}}));
+    };
+    const auto scene = import("Material \"conductor\" Translate 100 0 0 ReverseOrientation\n"
+                              "MakeNamedMaterial \"m\" \"string type\" \"diffuse\"\n"
+                              "AttributeBegin Shape \"disk\" AttributeEnd");
+    EXPECT_EQ(find(scene, "shape").type, "disk");
+    EXPECT_EQ(find(scene, "shape", 1).type, "sphere");
+    EXPECT_EQ(child(scene, find(scene, "shape", 1), "bsdf").type, "twosided");
+    EXPECT_FALSE(find(scene, "shape", 1).find("to_world"));
+    EXPECT_FALSE(find(scene, "shape", 1).find("flip_normals"));
+    expect_scene_error(1, "AttributeBegin is never closed", [&] { import("AttributeBegin"); });
+    expect_scene_error(1, "AttributeEnd without AttributeBegin",
+                       [&] { import("AttributeEnd AttributeBegin", "AttributeBegin\n"); });
 }
 
 // ---- Shapes
@@ -494,6 +626,50 @@ TEST(Pbrt, ConstantsAndProductsOfConstantsAreColours) {
         "Material \"matte\" \"texture Kd\" \"b\" " +
         std::string(kSphere));
     expect_near(value<Rgb>(material(scene), "reflectance"), Rgb(0.25f, 0.3f, 0.35f));
+}
+
+// The factor of a texture of spectra is a float in v4, a colour in v3 and in what was converted from it.
+TEST(Pbrt, FactorsOfV4AreFloats) {
+    const std::string textures = "Texture \"f\" \"float\" \"constant\" \"float value\" 0.5\n"
+                                 "Texture \"g\" \"float\" \"checkerboard\"\n"
+                                 "Texture \"g\" \"spectrum\" \"dots\"\n"
+                                 "Texture \"s\" \"spectrum\" \"constant\" \"rgb value\" [1 0 0]\n"
+                                 "Texture \"c\" \"spectrum\" \"checkerboard\"\n";
+    const auto product = [&](const std::string& factors) {
+        return parse4(textures + "Texture \"p\" \"spectrum\" \"scale\" " + factors +
+                      "\nMaterial \"diffuse\" \"texture reflectance\" \"p\"\n" + kSphere);
+    };
+    const auto constant = product("\"texture tex\" \"s\" \"texture scale\" \"f\"");
+    EXPECT_EQ(value<Rgb>(material(constant), "reflectance"), Rgb(0.5f, 0, 0));
+    const auto scaled = product("\"texture tex\" \"c\" \"texture scale\" \"f\"");
+    const SceneObject& half = child(scaled, material(scaled), "texture", "reflectance");
+    EXPECT_EQ(half.type, "scale");
+    EXPECT_EQ(value<Rgb>(half, "scale"), Rgb(0.5f));
+    EXPECT_EQ(child(scaled, half, "texture", "value").type, "checkerboard");
+    // A float texture is a number, also of an image of colours.
+    const auto varying = product("\"texture tex\" \"s\" \"texture scale\" \"g\"");
+    const SceneObject& mix = child(varying, material(varying), "texture", "reflectance");
+    EXPECT_EQ(mix.type, "mix");
+    EXPECT_EQ(value<Rgb>(mix, "value0"), Rgb(0));
+    EXPECT_EQ(value<Rgb>(mix, "value1"), Rgb(1, 0, 0));
+    EXPECT_EQ(child(varying, mix, "texture", "weight").type, "checkerboard");
+    const auto of_spectra = product("\"texture tex\" \"s\" \"texture scale\" \"c\"");
+    EXPECT_EQ(child(of_spectra, material(of_spectra), "texture", "reflectance").type, "scale");
+    expect_scene_error(7, "there is no float texture \"none\"",
+                       [&] { product("\"texture tex\" \"s\" \"texture scale\" \"none\""); });
+}
+
+TEST(Pbrt, CornersOfBilerpAreColours) {
+    expect_scene_error(3, "parameter \"v01\" of spectrum Texture \"bilerp\" must be", [] {
+        parse4("Texture \"c\" \"spectrum\" \"checkerboard\"\n"
+               "Texture \"b\" \"spectrum\" \"bilerp\" \"texture v01\" \"c\"");
+    });
+    const auto floats = parse4("Texture \"b\" \"float\" \"bilerp\" \"float v01\" 0.25\n"
+                               "Shape \"sphere\" \"texture alpha\" \"b\"");
+    int count = 0;
+    for (const SceneObject& o : floats.objects)
+        if (o.type == "bilerp") count += value<Rgb>(o, "v01") == Rgb(0.25f);
+    EXPECT_EQ(count, 1);
 }
 
 TEST(Pbrt, CheckerboardHasOneSquareToTheUnit) {
