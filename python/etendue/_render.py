@@ -523,6 +523,7 @@ def resume(
     package, another kind of processor. Raises RenderError if a pass fails.
     """
     _etendue.check_aovs(list(aovs))
+    spp = count("spp", spp)
     of = _etendue.read_checkpoint(fspath(file))
     if integrator is None and " in Python, " in of["condition"]:
         raise ValueError(f"{fspath(file)}: expected integrator, an object like the {of['integrator']} that it was rendered by")

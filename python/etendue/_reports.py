@@ -283,11 +283,16 @@ def compare(
     files = [reference] if isinstance(reference, (str, PathLike)) else list(reference or ())
     folders = [(name, fspath(folder)) for name, folder in (images or {}).items()]
     spp, seed, reference_spp = count("spp", spp), count("seed", seed) or 0, count("reference_spp", reference_spp)
+    if files and not (reference_method is None and reference_time is None and reference_spp is None):
+        raise ValueError("reference excludes reference_method, reference_time and reference_spp, which apply to rendered references")
+    shortest, longest = lengths
+    if shortest < 1 or (longest is not None and longest < shortest):
+        raise ValueError(f"lengths must be (shortest, longest), from 1 edge on, but is {lengths}")
     listener, end = _status(progress)
     try:
         comparisons, text = _etendue.compare(
             [built(s, threads) for s in wanted], _methods(methods), time, spp, runs, seed, sampler, threads, techniques,
-            paths, lengths[0], lengths[1], reference_method, reference_time, reference_spp, [fspath(f) for f in files],
+            paths, shortest, longest, reference_method, reference_time, reference_spp, [fspath(f) for f in files],
             fspath(references), folders, listener,
         )
     finally:

@@ -116,8 +116,8 @@ def sample_paths(
 ) -> NDArray[Any]:
     """The first n paths with a contribution, in the order of a rendering with one thread, as a structured array, shape (n,).
 
-    Fields: s, t; strategy, a number in the order hit, next_event, connect, splat, hit_lens, merge, gather; pixel, its
-    index row by row; vertices, their number; mis_weight; contribution, unweighted radiance of shape (3,); film, in
+    Fields: s, t; strategy, a number in the order hit, next_event, connect, splat, hit_lens, merge, gather, specular; pixel,
+    its index row by row; vertices, their number; mis_weight; contribution, unweighted radiance of shape (3,); film, in
     pixels, shape (2,); x, positions in scene units, shape (max_vertices, 3), from the emitter to the lens, NaN after the
     last. Longer paths, and those of merges and gathers, are left out.
     """

@@ -50,6 +50,8 @@ def test_what_would_change_bits_is_refused(cornell: et.Scene, demo: et.Scene, tm
         et.resume(tmp_path / "b.etd", cornell, spp=2)
     with pytest.raises(RuntimeError, match="missing.etd"):
         et.resume(tmp_path / "missing.etd", cornell, spp=2)
+    with pytest.raises(ValueError, match="spp must lie between 0 and"):
+        et.resume(tmp_path / "a.etd", cornell, spp=-1)
 
 
 def test_a_sum_does_not_replace_its_parts(cornell: et.Scene, tmp_path: Path) -> None:

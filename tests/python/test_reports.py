@@ -89,6 +89,15 @@ def test_wrong_arguments_of_compare(cornell: et.Scene) -> None:
             et.compare(cornell, ["path"], **arguments)
 
 
+def test_compare_refuses_what_does_not_go_together(cornell: et.Scene) -> None:
+    for more in ({"reference_time": 1.0}, {"reference_spp": 2}, {"reference_method": "path"}):
+        with pytest.raises(ValueError, match="reference excludes reference_method"):
+            et.compare(cornell, ["path"], spp=1, reference="missing.exr", progress=False, **more)  # type: ignore[arg-type]
+    for lengths in ((3, 1), (0, 2), (-1, None)):
+        with pytest.raises(ValueError, match="lengths must be"):
+            et.compare(cornell, ["path"], spp=1, lengths=lengths, progress=False)
+
+
 def test_diff_has_the_figures_of_the_command_line(program: str, tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     a, b = (rng.random((20, 30, 3), dtype=np.float32) for _ in range(2))
