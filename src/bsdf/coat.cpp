@@ -78,4 +78,10 @@ float reflectance_below_coat(float eta, float thickness) {
     return float(sum);
 }
 
+float loss_below_coat(float eta, float thickness) {
+    const float transmitted = fresnel_diffuse_transmittance(1 / eta);
+    if (thickness == 0) return transmitted;
+    return std::max(1 - reflectance_below_coat(eta, thickness), transmitted);
+}
+
 }  // namespace etendue

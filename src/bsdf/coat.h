@@ -24,7 +24,8 @@ inline float coat_probability(float F, float specular_share) {
 
 /// Cosine below the coat of a direction with cosine `cos` >= 0 above it; 0 under total reflection.
 inline float cos_below_coat(float cos, float eta) {
-    return safe_sqrt(1 - (1 - cos) * (1 + cos) / sqr(eta));
+    if (eta == 1) return cos;  // its square may be zero
+    return safe_sqrt((sqr(cos) + (eta - 1) * (eta + 1)) / sqr(eta));
 }
 /// What a coat of optical thickness τ lets pass on the way down and up again, exp(−τ (1/c_o + 1/c_i)), for the cosines
 /// of both directions below it.
@@ -35,6 +36,8 @@ inline float coat_attenuation(float thickness, float cos_o, float cos_i) {
 ///     2 ∫ F(μ) exp(−2τ/μ) μ dμ;
 /// `eta` is η of the coat over η outside.
 float reflectance_below_coat(float eta, float thickness);
+/// 1 − reflectance_below_coat(): above zero also where η is large.
+float loss_below_coat(float eta, float thickness);
 
 /// Mean of `value(m)` over the facets m visible from `wo`, by the midpoint rule with n × n points.
 template <class F>

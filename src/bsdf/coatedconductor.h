@@ -11,8 +11,10 @@ namespace etendue {
 /// The geometric series is exact for a smooth metal, where T_o = T_i. Elsewhere the minimum keeps it reciprocal, and the
 /// energy of the metal's lobe below min(T_o, T_i).
 inline Rgb coated_reflectance(Rgb metal, float To, float Ti, float attenuation) {
+    // For a white metal the limit at grazing angles would be 0/0.
+    if (!(To > 0 && Ti > 0)) return Rgb(0);
     const Rgb once = metal * attenuation;
-    return once * (To * Ti) / (Rgb(1) - once * std::fmin(1 - To, 1 - Ti));
+    return once * (To * Ti) / (Rgb(1) - once + once * std::fmax(To, Ti));
 }
 
 /// Share of the light from outside that enters a coat; `table` is RoughTransmittance::table() of a rough one, or nullptr.

@@ -24,4 +24,9 @@ float fresnel_diffuse_reflectance(float eta) {
     return float(1 - (1 - external_diffuse_reflectance(1 / double(eta))) * sqr(double(eta)));
 }
 
+float fresnel_diffuse_transmittance(float eta) {
+    if (eta >= 1) return float(1 - external_diffuse_reflectance(eta));
+    return float((1 - external_diffuse_reflectance(1 / double(eta))) * sqr(double(eta)));
+}
+
 }  // namespace etendue

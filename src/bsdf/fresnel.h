@@ -69,5 +69,7 @@ inline Rgb fresnel_conductor(float cos_i, Rgb eta, Rgb k) {
 /// is η of the other side over η of the light's side. Closed form for eta > 1 [Walsh 1926; Duntley 1942]; eta < 1
 /// follows from 1 − F_int = (1 − F_ext)/η².
 float fresnel_diffuse_reflectance(float eta);
+/// 1 − fresnel_diffuse_reflectance(eta), also where this is far below the resolution of the reflectance.
+float fresnel_diffuse_transmittance(float eta);
 
 }  // namespace etendue

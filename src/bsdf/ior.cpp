@@ -44,6 +44,8 @@ constexpr NamedIor kNamedIors[] = {
 
 /// Far beyond any metal; larger indices overflow in the Fresnel equations.
 constexpr float kMaxConductorIndex = 1e4f;
+/// The same of dielectrics.
+constexpr float kMaxIor = 1e6f;
 
 float named_ior(const Params& params, const char* parameter, const std::string& name) {
     const auto it = std::find_if(std::begin(kNamedIors), std::end(kNamedIors),
@@ -62,7 +64,7 @@ float read_ior(const Params& params, const char* name, const char* fallback) {
     const Param* p = params.object().find(name);
     if (!p || p->type() == ParamType::String)
         return named_ior(params, name, params.text(name, fallback));
-    const float ior = params.number(name, 1, 0);
+    const float ior = params.number(name, 1, 0, kMaxIor);
     if (!(ior > 0))
         params.fail(name, fmt::format("parameter \"{}\" is {}, but must be above 0", name, ior));
     return ior;

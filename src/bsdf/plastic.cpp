@@ -19,11 +19,11 @@ PlasticParams::PlasticParams(const Params& params, MaterialContext& context)
       eta(read_ior(params, "int_ior", "polypropylene") / read_ior(params, "ext_ior", "air")),
       nonlinear(params.flag("nonlinear", false)), thickness(params.number("thickness", 0, 0)) {}
 
-PlasticParams::Colors PlasticParams::eval(const TexturePoint& at, float F_int) const {
+PlasticParams::Colors PlasticParams::eval(const TexturePoint& at, float loss) const {
     const Rgb d = diffuse.eval(at), s = specular.eval(at);
-    const Rgb reflected_again = nonlinear ? d * F_int : Rgb(F_int);
+    const Rgb lost = nonlinear ? Rgb(1) - d + d * loss : Rgb(loss);
     const float sum = s.mean() + d.mean();
-    return {.diffuse = d / ((Rgb(1) - reflected_again) * sqr(eta)),
+    return {.diffuse = d / (lost * sqr(eta)),
             .specular = s,
             .specular_share = sum > 0 ? s.mean() / sum : 0};
 }
@@ -51,13 +51,11 @@ namespace {
 class Plastic final : public Material {
 public:
     Plastic(const Params& params, MaterialContext& context)
-        : params_(params, context), F_int_(reflectance_below_coat(params_.eta, params_.thickness)) {
-    }
+        : params_(params, context), loss_(loss_below_coat(params_.eta, params_.thickness)) {}
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
-        const auto [diffuse, specular, specular_share] =
-            params_.eval(point.texture_point(), F_int_);
+        const auto [diffuse, specular, specular_share] = params_.eval(point.texture_point(), loss_);
         list.add(frame,
                  PlasticLobe{diffuse, specular, params_.eta, specular_share, params_.thickness},
                  weight);
@@ -66,7 +64,7 @@ public:
 
 private:
     PlasticParams params_;
-    float F_int_;
+    float loss_;
 };
 
 }  // namespace

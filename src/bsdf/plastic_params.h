@@ -19,10 +19,10 @@ struct PlasticParams {
             specular_share;  ///< Share of the specular colour in the sum of both, without the coat.
     };
     /// Colours at `at`. The diffuse one includes interreflection below the coat, but not the two transmittances:
-    ///     ρ / (η² (1 − ρ' F_int)),
-    /// where F_int is the coat's reflectance for diffuse light from below, see reflectance_below_coat(). With `nonlinear` ρ' =
-    /// ρ, which saturates the colour; otherwise ρ' = 1, which keeps the hue of textures.
-    Colors eval(const TexturePoint& at, float F_int) const;
+    ///     ρ / (η² (1 − ρ' F_int)) = ρ / (η² (1 − ρ' + ρ' loss)),
+    /// where F_int = 1 − `loss` is the coat's reflectance for diffuse light from below, see loss_below_coat(). With
+    /// `nonlinear` ρ' = ρ, which saturates the colour; otherwise ρ' = 1, which keeps the hue of textures.
+    Colors eval(const TexturePoint& at, float loss) const;
     Rgb mean_albedo() const;
 
     /// Rows for the tables of plug-ins with these parameters.

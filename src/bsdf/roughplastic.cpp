@@ -53,8 +53,11 @@ public:
     RoughPlastic(const Params& params, MaterialContext& context)
         : params_(params, context), coat_(read_distribution(params),
                                           context.texture(params, "alpha", Rgb(0.1f)), params_.eta),
-          absorption_(reflectance_below_coat(params_.eta, params_.thickness) /
-                      reflectance_below_coat(params_.eta, 0)) {}
+          least_loss_(loss_below_coat(params_.eta, params_.thickness)) {
+        // Without a step of the index nothing is reflected.
+        const float R = reflectance_below_coat(params_.eta, 0);
+        if (R > 0) absorption_ = reflectance_below_coat(params_.eta, params_.thickness) / R;
+    }
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
@@ -62,7 +65,7 @@ public:
         const float alpha = coat_.alpha(at);
         const RoughTransmittance& T = coat_.transmittance(alpha);
         const auto [diffuse, specular, share] =
-            params_.eval(at, T.internal_reflectance() * absorption_);
+            params_.eval(at, std::max(1 - T.internal_reflectance() * absorption_, least_loss_));
         list.add(frame,
                  RoughPlasticLobe{diffuse, specular, coat_.distribution(alpha), params_.eta, share,
                                   params_.thickness, T.table()},
@@ -75,7 +78,9 @@ private:
     PlasticParams params_;
     RoughCoat coat_;
     /// Factor of the internal reflectance by absorption in the coat: that of a smooth coat.
-    float absorption_;
+    float absorption_ = 1;
+    /// Of a smooth coat, which reflects more; the loss of a rough one is rounded where η is large.
+    float least_loss_;
 };
 
 }  // namespace

@@ -116,6 +116,10 @@ TEST_F(Coated, ValueDensityAndWeightAgree) {
         }
         expect_finite(lobe);
     }
+    for (const double coat_alpha : {0.0, 0.3})
+        expect_finite(lobe<CoatedConductorLobe>(
+            "coatedconductor",
+            {{"alpha", 0.3}, {"coat_alpha", coat_alpha}, {"int_ior", 1.5}, {"ext_ior", 1.5}}));
     for (Vec3 wo : test_directions()) expect_delta_events_reverse(mirror(0.1), wo);
     expect_finite(mirror(0.1));
 }

@@ -93,5 +93,18 @@ TEST(Fresnel, DiffuseReflectanceMatchesQuadrature) {
     }
 }
 
+TEST(Fresnel, DiffuseTransmittanceHasItsDigitsForAnyIndex) {
+    for (const float eta : {0.1f, 0.7f, 1.0f, 1.5f, 10.0f})
+        EXPECT_NEAR(fresnel_diffuse_transmittance(eta), 1 - fresnel_diffuse_reflectance(eta), 1e-6);
+    for (const float eta : {1e3f, 1e4f, 1e6f}) {
+        // 1 − R → 2 (μ + 1/μ) / η.
+        const double limit = 16 / (3 * double(eta));
+        EXPECT_NEAR(fresnel_diffuse_transmittance(eta) / limit, 1, 0.05) << eta;
+        EXPECT_NEAR(fresnel_diffuse_transmittance(1 / eta) * sqr(double(eta)) /
+                        fresnel_diffuse_transmittance(eta),
+                    1, 1e-5);
+    }
+}
+
 }  // namespace
 }  // namespace etendue

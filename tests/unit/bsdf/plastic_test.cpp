@@ -4,6 +4,8 @@
 
 #include <thread>
 
+#include <fmt/format.h>
+
 #include "bsdf/roughdielectric.h"
 #include "bsdf/roughplastic.h"
 #include "lobe_tests.h"
@@ -61,11 +63,33 @@ TEST_F(PlasticTest, SmoothValueDensityAndWeightAgree) {
 
 // F + (1 − F) (1 − F_ext) ρ / (η² (1 − F_int)) = 1 for ρ = 1, because 1 − F_ext = η² (1 − F_int).
 TEST_F(PlasticTest, WhiteSmoothPlasticLosesNothing) {
-    for (const double ior : {1.1, 1.5, 2.5})
+    for (const double ior : {1.1, 1.5, 2.5, 1000.0})
         for (const bool nonlinear : {false, true})
             for (Vec3 wo : test_directions()) {
                 const Albedo a = sampled_albedo(smooth(Rgb(1), nonlinear, ior), wo);
                 EXPECT_NEAR(a.value.g, 1, 5 * a.standard_error.g + 1e-4) << ior;
+            }
+}
+
+TEST_F(PlasticTest, IndicesMayBeEqualOrLarge) {
+    TestMaterials m;
+    for (const double ior : {1.0, 1.0001, 30.0, 1e4, 1e6})
+        for (const bool nonlinear : {false, true})
+            for (const double thickness : {0.0, 0.1}) {
+                SCOPED_TRACE(fmt::format("{} {} {}", ior, nonlinear, thickness));
+                const auto made = [&](const char* type) -> const Material& {
+                    return m.make(type, {{"int_ior", ior},
+                                         {"ext_ior", 1.0},
+                                         {"nonlinear", nonlinear},
+                                         {"thickness", thickness}});
+                };
+                const auto smooth = lobe_of<PlasticLobe>(made("plastic"));
+                const auto rough = lobe_of<RoughPlasticLobe>(made("roughplastic"));
+                expect_finite(smooth);
+                expect_finite(rough);
+                if (ior > 1) continue;
+                EXPECT_EQ(smooth.diffuse, Rgb(0.5f));
+                EXPECT_EQ(rough.diffuse, Rgb(0.5f));
             }
 }
 
