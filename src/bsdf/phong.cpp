@@ -2,7 +2,7 @@
 // lobe about the mirror direction, as in Mitsuba 0.6.
 //   diffuse_reflectance (0.5)   colour or texture in [0, 1]
 //   specular_reflectance (0.2)  colour or texture in [0, 1]
-//   exponent (30)               number or texture, at least 0
+//   exponent (30)               number or texture, 0 to 1e8
 // Where the sum of the two colours exceeds one, both are scaled down. The part of the lobe below the surface is lost.
 // One-sided.
 
@@ -15,8 +15,10 @@ namespace etendue {
 
 BsdfEval PhongLobe::eval(Vec3 wo, Vec3 wi) const {
     if (!(wo.z > 0 && wi.z > 0)) return {};
-    const float cos_alpha = dot(reflect(wo), wi);
-    const float lobe = cos_alpha > 0 ? std::pow(cos_alpha, exponent) * (0.5f * kInvPi) : 0;
+    // cos α = 1 − |r − wi|²/2, where a sharp lobe needs more digits than a product of unit vectors has.
+    const float versine = 0.5f * length2(reflect(wo) - wi);
+    const float lobe =
+        versine < 1 ? std::exp(exponent * std::log1p(-versine)) * (0.5f * kInvPi) : 0;
     const float specular_pdf = specular_probability * (exponent + 1) * lobe;
     const float diffuse_share = (1 - specular_probability) * kInvPi;
     return {.f = (diffuse * kInvPi + specular * ((exponent + 2) * lobe)) * wi.z,
@@ -31,8 +33,8 @@ std::optional<BsdfSample> PhongLobe::sample(Vec3 wo, float u_lobe, Vec2 u) const
         return make_sample(wi, eval(wo, wi));
     }
     // Density (n + 1)/(2π) cosⁿ α about the mirror direction; directions below the surface end the walk.
-    const float cos_alpha = std::pow(u.x, 1 / (exponent + 1)),
-                sin_alpha = safe_sqrt(1 - sqr(cos_alpha));
+    const float log_cos = std::log(u.x) / (exponent + 1), cos_alpha = std::exp(log_cos),
+                sin_alpha = std::sqrt(-std::expm1(2 * log_cos));
     float s, c;
     sincosf(2 * kPi * u.y, &s, &c);
     const Vec3 wi = normalize(
@@ -42,12 +44,15 @@ std::optional<BsdfSample> PhongLobe::sample(Vec3 wo, float u_lobe, Vec2 u) const
 
 namespace {
 
+/// Directions in single precision do not resolve sharper lobes.
+constexpr float kMaxExponent = 1e8f;
+
 class Phong final : public Material {
 public:
     Phong(const Params& params, MaterialContext& context)
         : diffuse_(context.texture(params, "diffuse_reflectance", Rgb(0.5f), 1)),
           specular_(context.texture(params, "specular_reflectance", Rgb(0.2f), 1)),
-          exponent_(context.texture(params, "exponent", Rgb(30))) {}
+          exponent_(context.texture(params, "exponent", Rgb(30), kMaxExponent)) {}
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
                 ComponentList& list) const override {
@@ -74,17 +79,16 @@ private:
 }  // namespace
 
 MaterialEntry phong_entry() {
-    return {
-        {"bsdf",
-         "phong",
-         "Modified Phong model: a diffuse part and a cosine lobe about the mirror direction "
-         "[Lafortune & Willems 1994].",
-         {{"diffuse_reflectance", ParamKind::Texture, "0.5",
-           "Albedo of the diffuse part, in [0, 1]."},
-          {"specular_reflectance", ParamKind::Texture, "0.2",
-           "Albedo of the lobe at normal incidence, in [0, 1]."},
-          {"exponent", ParamKind::Texture, "30", "Exponent of the lobe's cosine, at least 0."}}},
-        make_material<Phong>};
+    return {{"bsdf",
+             "phong",
+             "Modified Phong model: a diffuse part and a cosine lobe about the mirror direction "
+             "[Lafortune & Willems 1994].",
+             {{"diffuse_reflectance", ParamKind::Texture, "0.5",
+               "Albedo of the diffuse part, in [0, 1]."},
+              {"specular_reflectance", ParamKind::Texture, "0.2",
+               "Albedo of the lobe at normal incidence, in [0, 1]."},
+              {"exponent", ParamKind::Texture, "30", "Exponent of the lobe's cosine, 0 to 1e8."}}},
+            make_material<Phong>};
 }
 
 }  // namespace etendue

@@ -11,6 +11,7 @@ namespace {
 using namespace etendue::testing;
 
 constexpr float kExponents[] = {0, 5, 300};
+constexpr float kSharpExponents[] = {1e5f, 1e7f, 1e8f};
 
 PhongLobe phong(float exponent) {
     return {Rgb(0.3f, 0.2f, 0.1f), Rgb(0.5f, 0.6f, 0.7f), exponent, 0.7f};
@@ -38,6 +39,27 @@ TEST(Phong, ValueDensityAndWeightAgree) {
     }
 }
 
+// Products of unit vectors in float, whose error is near 1e-7, have not enough digits for cosⁿ α.
+TEST(Phong, SharpLobesAreThoseOfTheirExponent) {
+    for (const float n : kSharpExponents) {
+        SCOPED_TRACE(n);
+        const PhongLobe lobe = phong(n);
+        expect_finite(lobe);
+        for (Vec3 wo : test_directions()) {
+            const Vec3 mirror = reflect(wo);
+            const Frame frame = Frame::from_normal(mirror);
+            for (const double share : {0.0, 0.5, 1.0, 1.5}) {
+                const double angle = share / std::sqrt(double(n));
+                const Vec3 wi = normalize(mirror + frame.s * float(std::tan(angle)));
+                const double expected = 0.7 * (double(n) + 1) / (2 * M_PI) *
+                                        std::exp(double(n) * std::log(std::cos(angle)));
+                EXPECT_NEAR(double(lobe.eval(wo, wi).pdf) / expected, 1, 0.01) << share;
+            }
+            EXPECT_NEAR(sampled_albedo(lobe, wo).value.g, 0.2 + 0.6 * double(wo.z), 0.02);
+        }
+    }
+}
+
 TEST(Phong, AlbedoAtNormalIncidenceIsTheSumOfTheColours) {
     for (const float n : kExponents) {
         const PhongLobe lobe = phong(n);
@@ -56,6 +78,7 @@ TEST(Phong, ColoursAreScaledDownToConserveEnergy) {
     const Bsdf bsdf = bright.bsdf(plane_point({0, 0, 1}), arena);
     EXPECT_TRUE(nearly(bsdf.albedo_estimate(), Rgb(1), 1e-6, 0));
     EXPECT_THROW(m.make("phong", {{"exponent", -1.0}}), SceneError);
+    EXPECT_THROW(m.make("phong", {{"exponent", 2e8}}), SceneError);
 }
 
 }  // namespace
