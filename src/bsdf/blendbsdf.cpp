@@ -19,6 +19,7 @@ public:
         weight_ = context.texture(params, "weight", Rgb(0.5f), 1);
         const auto nested = nested_materials(params, context, 2, 2);
         nested_ = {nested[0], nested[1]};
+        check_components(params, *this);
     }
 
     void append(const SurfacePoint& point, const Frame& frame, float weight,
@@ -45,6 +46,9 @@ public:
     }
     bool may_have_delta() const override {
         return nested_[0]->may_have_delta() || nested_[1]->may_have_delta();
+    }
+    int max_components() const override {
+        return nested_[0]->max_components() + nested_[1]->max_components();
     }
     bool perturbs_normals() const override {
         return nested_[0]->perturbs_normals() || nested_[1]->perturbs_normals();

@@ -73,6 +73,7 @@ public:
     bool may_have_delta() const override {
         return may_have(specular_) || may_have(specular_transmission_);
     }
+    int max_components() const override { return 3; }
     Rgb mean_albedo() const override {
         const float F = fresnel_dielectric(1, eta_).R;
         return diffuse_.mean() + diffuse_transmission_.mean() +

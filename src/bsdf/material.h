@@ -79,6 +79,8 @@ public:
     virtual bool may_be_smooth() const { return true; }
     /// False if no lobe is delta at any point.
     virtual bool may_have_delta() const { return true; }
+    /// The most lobes that append() adds.
+    virtual int max_components() const { return 1; }
     /// Whether it shades with other normals than that of the shape.
     virtual bool perturbs_normals() const { return false; }
     /// Whether turn() does to frames what append() does.

@@ -22,6 +22,7 @@ public:
                 params.fail(
                     "bsdf \"mixturebsdf\" cannot hold a masked material (to mask it, put the "
                     "\"mixturebsdf\" into a \"mask\")");
+        check_components(params, *this);
         if (!params.flag("ensure_energy_conservation", true)) return;
         float sum = 0;
         for (float w : weights_) sum += w;
@@ -44,6 +45,11 @@ public:
     }
     bool may_have_delta() const override {
         return any([](const Material& m) { return m.may_have_delta(); });
+    }
+    int max_components() const override {
+        int sum = 0;
+        for (const Material* m : nested_) sum += m->max_components();
+        return sum;
     }
     bool perturbs_normals() const override {
         return any([](const Material& m) { return m.perturbs_normals(); });

@@ -547,6 +547,7 @@ public:
         return constants_.alpha_varies || !has_smooth_facets() || may_be(coat_) || may_be(fuzz_) ||
                !(is_one(metalness_) || is_one(transmission_));
     }
+    int max_components() const override { return 2; }
     bool may_have_delta() const override {
         return constants_.alpha_varies || has_smooth_facets() || may_be(coat_) ||
                (is_thin_ && may_be(transmission_));

@@ -34,6 +34,9 @@ public:
     bool may_have_delta() const override {
         return front_->may_have_delta() || back_->may_have_delta();
     }
+    int max_components() const override {
+        return std::max(front_->max_components(), back_->max_components());
+    }
     bool needs_tangents() const override {
         return front_->needs_tangents() || back_->needs_tangents();
     }

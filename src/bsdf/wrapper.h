@@ -21,6 +21,16 @@ inline std::vector<const Material*> nested_materials(const Params& params, Mater
     return nested;
 }
 
+/// Throws SceneError where BsdfSample::event could not tell the delta events of a mixture apart.
+inline void check_components(const Params& params, const Material& mixture) {
+    constexpr int kMost = 128;
+    if (mixture.may_have_delta() && mixture.max_components() > kMost)
+        params.fail(
+            fmt::format("bsdf \"{}\" has {} materials, but where one of them may be a mirror or "
+                        "clear glass, {} are the most",
+                        params.object().type, mixture.max_components(), kMost));
+}
+
 /// A material that modifies one nested material; everything not overridden is that of the nested one.
 class WrapperMaterial : public Material {
 public:
@@ -30,6 +40,7 @@ public:
     bool is_two_sided() const override { return nested_->is_two_sided(); }
     bool may_be_smooth() const override { return nested_->may_be_smooth(); }
     bool may_have_delta() const override { return nested_->may_have_delta(); }
+    int max_components() const override { return nested_->max_components(); }
     bool perturbs_normals() const override { return nested_->perturbs_normals(); }
     bool has_jet() const override { return nested_->has_jet(); }
     void turn(const SurfacePointJet& point, FrameOf<Vec3Dual>& frame) const override {

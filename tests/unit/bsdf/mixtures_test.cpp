@@ -245,5 +245,37 @@ TEST(Mixtures, TexturedRoughPlasticIsThatOfItsRoughness) {
     }
 }
 
+// Numbers of delta events have eight bits.
+TEST(Mixtures, TellAllDeltaEventsApart) {
+    TestMaterials m;
+    // The second material is the last one of the list.
+    const auto mixed = [&](int diffuse, const char* second) {
+        std::vector<TestMaterials::Child> children(size_t(diffuse),
+                                                   {"", m.bsdf("diffuse", {{"reflectance", 0.5}})});
+        children.insert(children.begin() + 1, {"", m.bsdf(second)});
+        std::string weights = "0.001 0.5";
+        for (int i = 1; i < diffuse; ++i) weights += " 0.001";
+        return m.bsdf("mixturebsdf", {{"weights", weights}}, children);
+    };
+    const Vec3 wo = direction(40, 0);
+    ComponentArena arena;
+    const Bsdf bsdf = m.make(mixed(127, "conductor")).bsdf(plane_point(wo), arena);
+    const auto sampled = bsdf.sample(wo, 0.9f, {0.5f, 0.5f}, TransportMode::Radiance);
+    ASSERT_TRUE(sampled && sampled->is_delta);
+    const auto again = bsdf.sample_delta(wo, sampled->event, TransportMode::Radiance);
+    ASSERT_TRUE(again);
+    EXPECT_EQ(again->pdf, sampled->pdf);
+    EXPECT_THROW(m.make(mixed(128, "conductor")), SceneError);
+    EXPECT_NO_THROW(m.make(mixed(300, "diffuse")));
+    const auto blend = [&](const char* second) {
+        const int a = mixed(100, "diffuse"), b = mixed(20, second), c = mixed(20, "diffuse");
+        const int inner = m.bsdf("blendbsdf", {{"weight", 0.5}}, {{"", b}, {"", c}});
+        m.make("blendbsdf", {{"weight", 0.5}},
+               {{"", a}, {"", m.bsdf("mask", {{"opacity", 0.5}}, {{"", inner}})}});
+    };
+    EXPECT_NO_THROW(blend("diffuse"));
+    EXPECT_THROW(blend("dielectric"), SceneError);
+}
+
 }  // namespace
 }  // namespace etendue
