@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "description/resolve_file.h"
+#include "emitter/point.h"
 #include "image/image_io.h"
 #include "math/distribution.h"
 #include "system/huge_pages.h"
@@ -22,6 +23,10 @@ public:
           to_local_(to_world.inverse()) {
         // height + 1 rows of cells: above the first row of centres, between adjacent rows, and below the last row.
         std::vector<float> weights(size_t(width) * (height + 1));
+        // A power of two, so that sums of the largest numbers are finite, and others have the same digits.
+        float largest = 0;
+        for (const Rgb& c : pixels_) largest = std::max(largest, c.max());
+        const float scale = largest > 0x1p96f ? 0x1p-64f : 1.0f;
         for (int y = 0; y <= height; ++y) {
             const double top = std::max(0.0, (y - 0.5) / height),
                          bottom = std::min(1.0, (y + 0.5) / height);
@@ -29,12 +34,13 @@ public:
             const double area =
                 std::cos(std::numbers::pi * top) - std::cos(std::numbers::pi * bottom);
             for (int x = 0; x < width; ++x) {
-                const Rgb sum =
-                    texel(x, y - 1) + texel(x + 1, y - 1) + texel(x, y) + texel(x + 1, y);
+                const Rgb sum = texel(x, y - 1) * scale + texel(x + 1, y - 1) * scale +
+                                texel(x, y) * scale + texel(x + 1, y) * scale;
                 weights[size_t(y) * width + x] = float(0.25 * luminance(sum) * area);
                 mean_ += 0.25 * luminance(sum) * area / width / 2;
             }
         }
+        mean_ /= double(scale);
         distribution_ = PiecewiseConstant2D(weights, width, height + 1);
         prefer_huge_pages(pixels_);
         distribution_.for_each_large_array([](const auto& a) { prefer_huge_pages(a); });
@@ -211,7 +217,7 @@ EmitterEntry envmap_entry() {
                 RgbImage image =
                     read_emission_image(p, p.rgb("tint", Rgb(1)) * p.number("scale", 1, 0));
                 std::vector<std::unique_ptr<Emitter>> made;
-                const Transform to_world = p.transform("to_world");
+                const Transform to_world = similarity(p, "to_world");
                 made.push_back(make_environment(p, std::move(image), to_world));
                 return made;
             }};

@@ -135,8 +135,10 @@ Transform similarity(const Params& params, const char* name) {
     if (std::fabs(length(y) - size) > tolerance || std::fabs(length(z) - size) > tolerance ||
         std::fabs(dot(x, y)) > tolerance * size || std::fabs(dot(y, z)) > tolerance * size ||
         std::fabs(dot(z, x)) > tolerance * size)
-        params.fail(name, "the transform of a light with an image may rotate, mirror, move and "
-                          "scale by the same factor along all axes, but not distort");
+        params.fail(
+            name, fmt::format("\"{}\" of emitter \"{}\" may rotate, mirror, move and scale by the "
+                              "same factor along all axes, but not distort",
+                              name, params.object().type));
     return t;
 }
 

@@ -89,7 +89,8 @@ std::unique_ptr<Emitter> scaled_to_power(const Params& params, RgbImage image, c
     for (Rgb& c : image.pixels) c *= float(wanted / power);
     return make(std::move(image));
 }
-/// A parameter that maps the directions of an image without distortion: rotation, mirror, uniform scale and translation.
+/// A parameter that maps the directions of an image or a sky without distortion: rotation, mirror, uniform scale and
+/// translation.
 Transform similarity(const Params& params, const char* name);
 
 /// The image of a `projection` in W/sr, with its half extents on the plane at the distance 1.

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "emitter/environment.h"
+#include "emitter/point.h"
 #include "emitter/sky_model.h"
 #include "math/frame.h"
 
@@ -109,7 +110,7 @@ struct Daylight {
 
 Daylight read_daylight(const Params& p) {
     Daylight out;
-    out.to_world = p.transform("to_world") * kFromYUp;
+    out.to_world = similarity(p, "to_world") * kFromYUp;
     out.turbidity = p.number("turbidity", 3, 1, 10);
     if (p.has("sun_direction")) {
         const Vec3 d = out.to_world.inverse().vector(p.vector("sun_direction", {}));

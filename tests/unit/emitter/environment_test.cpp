@@ -48,5 +48,26 @@ TEST(Environment, AWhiteImageIsSampledUniformly) {
     EXPECT_NEAR(double(at_poles) / kSamples, expected, 4 * std::sqrt(expected / kSamples));
 }
 
+/// Sums of pixels could overflow.
+TEST(Environment, TheLargestRadianceIsFinite) {
+    constexpr float kRadiance = 3e38f;
+    for (const bool is_one_pixel : {false, true}) {
+        std::vector<Rgb> pixels(32, Rgb(is_one_pixel ? 0 : 1));
+        pixels[11] = Rgb(1);
+        const auto usual = make_environment(8, 4, pixels, Transform());
+        for (Rgb& c : pixels) c *= kRadiance;
+        const auto bright = make_environment(8, 4, pixels, Transform());
+        EXPECT_NEAR(bright->power() / usual->power() / double(kRadiance), 1, 1e-6);
+        testing::Random random(3);
+        for (int i = 0; i < 1000; ++i) {
+            const FinePoint u{double(random.next_1d()), double(random.next_1d())};
+            DirectSample a, b;
+            ASSERT_EQ(usual->sample_direct({}, u, a), bright->sample_direct({}, u, b));
+            EXPECT_NEAR(length(a.wi - b.wi), 0, 1e-4);
+            EXPECT_NEAR(b.pdf / a.pdf, 1, 1e-4);
+        }
+    }
+}
+
 }  // namespace
 }  // namespace etendue
