@@ -275,8 +275,22 @@ private:
         count_copies(group.size(), p.where());
         std::vector<Instance> shown = group;
         const Transform to_world = plugins_.attempt(index, [&] { return p.transform("to_world"); });
-        for (Instance& i : shown) i.to_world = to_world * i.to_world;
+        for (Instance& i : shown) {
+            i.to_world = to_world * i.to_world;
+            check_size(i.to_world, p.where());
+        }
         return shown;
+    }
+
+    /// Embree inverts the matrices of instances in float, by their determinants.
+    static void check_size(const Transform& to_world, const SourceLocation& where) {
+        constexpr double kLeast = 1e-12;
+        const double size = std::cbrt(std::fabs(to_world.determinant3()));
+        if (!(size >= kLeast))
+            throw SceneError(where,
+                             fmt::format("an instance must not be smaller than {} of its group, "
+                                         "but the scale of this one is {:.3g}",
+                                         kLeast, size));
     }
 
     /// Groups within groups multiply, so that a short file could fill any memory. Instances of groups that hold shapes

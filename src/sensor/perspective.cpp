@@ -9,6 +9,8 @@
 
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "description/view.h"
 #include "math/warp.h"
 
@@ -151,6 +153,17 @@ Transform rigid(const Params& params) {
     for (int c = 0; c < 3; ++c) {
         const double len = std::sqrt(m[0][c] * m[0][c] + m[1][c] * m[1][c] + m[2][c] * m[2][c]);
         for (int r = 0; r < 3; ++r) m[r][c] /= len;
+    }
+    // The axes are then those of a rotation, perhaps with a mirror.
+    constexpr double kTolerance = 1e-3;
+    for (int c = 0; c < 3; ++c) {
+        const int d = (c + 1) % 3;
+        if (!(std::fabs(m[0][c] * m[0][d] + m[1][c] * m[1][d] + m[2][c] * m[2][d]) < kTolerance))
+            params.fail(
+                "to_world",
+                fmt::format("\"to_world\" of sensor \"{}\" shears: it may rotate, mirror and "
+                            "move; a scale along the axes of the camera has no effect",
+                            params.object().type));
     }
     return Transform(m);
 }

@@ -32,6 +32,11 @@ TEST(SceneBuilder, RefusesCropsBeyondTheImage) {
 
 TEST(SceneBuilder, MessagesStateTheValueThatIsRefused) {
     const std::string ball = "<shape type=\"sphere\">";
+    const auto tiny_instance = [](const std::string& group, const std::string& scale) {
+        return "<shape type=\"instance\"><ref id=\"" + group +
+               "\"/><transform name=\"to_world\"><scale value=\"" + scale +
+               "\"/></transform></shape>";
+    };
     const auto bsdf = [&](const std::string& type, const std::string& params) {
         return ball + "<bsdf type=\"" + type + "\">" + params + "</bsdf></shape>";
     };
@@ -52,12 +57,56 @@ TEST(SceneBuilder, MessagesStateTheValueThatIsRefused) {
               "\"beam_width\" is 30, but must not exceed \"cutoff_angle\", which is 20"},
              {"<emitter type=\"sky\"><rgb name=\"albedo\" value=\"0.5, 2, 0\"/></emitter>",
               "\"albedo\" is (0.5, 2, 0)"},
+             {"<emitter type=\"sky\"><transform name=\"to_world\"><scale z=\"4\"/></transform>"
+              "</emitter>",
+              "\"to_world\" of emitter \"sky\" may rotate, mirror, move and scale by the same "
+              "factor"},
+             {"<emitter type=\"sunsky\"><transform name=\"to_world\"><scale x=\"2\"/></transform>"
+              "</emitter>",
+              "\"to_world\" of emitter \"sunsky\" may rotate"},
+             {"<emitter type=\"envmap\"><string name=\"filename\" value=\"" ETENDUE_SOURCE_DIR
+              "/tests/scenes/heights.pgm\"/><transform name=\"to_world\"><scale "
+              "y=\"3\"/></transform>"
+              "</emitter>",
+              "\"to_world\" of emitter \"envmap\" may rotate"},
+             {"<shape type=\"shapegroup\" id=\"g\">" + ball + "</shape></shape>" +
+                  tiny_instance("g", "1e-13"),
+              "must not be smaller than 1e-12 of its group, but the scale of this one is 1e-13"},
+             {"<shape type=\"shapegroup\" id=\"g\">" + ball +
+                  "</shape></shape><shape type=\"shapegroup\" id=\"h\">" +
+                  tiny_instance("g", "1e-7") + "</shape>" + tiny_instance("h", "-1e-7"),
+              "but the scale of this one is 1e-14"},
+             {bsdf("plastic", "<float name=\"int_ior\" value=\"1e9\"/>"), "int_ior"},
+             {bsdf("phong", "<float name=\"exponent\" value=\"1e9\"/>"),
+              "\"exponent\" is (1e+09, 1e+09, 1e+09)"},
              {bsdf("coatedconductor", "<float name=\"int_ior\" value=\"1\"/><float "
                                       "name=\"ext_ior\" value=\"2\"/>"),
               "the index of the coat is 0.5 times that outside"}}) {
         const std::string error =
             error_of([&xml = body] { build(front_camera(4) + room() + xml); });
         EXPECT_NE(error.find(message), std::string::npos) << error << "\nexpected: " << message;
+    }
+}
+
+// Columns of a camera's transform that are only scaled have the directions of the axes.
+TEST(SceneBuilder, CamerasMayBeScaledButNotSheared) {
+    for (const char* type : {"perspective", "thinlens"}) {
+        const auto camera = [&](const std::string& transform) {
+            return error_of([&] {
+                build("<sensor type=\"" + std::string(type) +
+                      "\"><float name=\"aperture_radius\" value=\"0.1\"/><float "
+                      "name=\"focus_distance\" value=\"3\"/><transform name=\"to_world\">" +
+                      transform + "</transform></sensor>" + room());
+            });
+        };
+        const std::string look = "<lookat origin=\"1,0.5,4\" target=\"0,0,0\" up=\"0.5,1,0\"/>";
+        EXPECT_EQ(camera(look), "");
+        EXPECT_EQ(camera("<scale x=\"2\" z=\"3\"/>" + look), "");
+        EXPECT_EQ(camera(look + "<scale x=\"-1\"/>"), "");
+        const std::string error = camera(look + "<scale x=\"1.5\"/>");
+        EXPECT_NE(error.find("\"to_world\" of sensor \"" + std::string(type) + "\" shears"),
+                  std::string::npos)
+            << error;
     }
 }
 
