@@ -17,16 +17,11 @@ def measured(command):
         return done, usage.ru_utime + usage.ru_stime
 
 
-def samples_in(seconds, seconds_of):
-    """The number of samples per pixel in that time, where seconds_of(samples) renders and tells how long it took. Short renderings
-    tell what a sample takes, and what the method does before the first one."""
-    first, samples = seconds_of(1), 1
-    growth = 0.0  # of the time by the samples after the first one
-    while growth < 0.1 * seconds and samples < 4096:
-        samples *= 2 if growth > 0.03 * seconds else 4
-        growth = seconds_of(samples) - first
-        if first + growth > seconds:
-            break
-    # Where the growth is that of noise, the last number is near enough.
-    each = max(growth, 0.02 * first, 1e-3 * seconds) / (samples - 1)
-    return max(1, round(samples + (seconds - first - growth) / each))
+def samples_in(seconds, statistics, cpu, wall, before=0):
+    """The number of samples per pixel that take so much processor time on one thread, from another rendering by one thread: its
+    statistics (--stats) and its processor and elapsed seconds. `before` seconds, as for reading the scene, do not count; what the
+    method does before its first sample does. The first pass contains that, so one pass alone says too little of a sample."""
+    passes = statistics["pass_seconds"]
+    each = cpu / wall * (sum(passes[1:]) / (len(passes) - 1) if len(passes) > 1 else passes[0])
+    start = max(0, cpu - before - each * len(passes))
+    return max(1, round((seconds - start) / each))
