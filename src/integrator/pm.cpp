@@ -16,6 +16,7 @@
 
 #include <fmt/format.h>
 
+#include "integrator/radius_params.h"
 #include "integrator/seen_extent.h"
 #include "math/hash.h"
 #include "reuse/irradiance_cache.h"
@@ -57,14 +58,13 @@ public:
         : mapping_(p, true), memory_(uint64_t(p.integer("memory", 1, 1 << 30)) << 20),
           source_(make_source(p, mapping_, memory_)),
           nearest_(p.integer("nearest", 2, PhotonMap::kMostNeighbours)),
-          gather_rays_(p.integer("gather_rays", 0, 1 << 20)), radius_(p.number("radius")),
+          gather_rays_(p.integer("gather_rays", 0, 1 << 20)), radius_(radius_param(p)),
           irradiance_(p.integer("irradiance", 0, 1 << 20)), retrace_(p.flag("retrace")),
           cache_error_(p.number("cache_error", 0, 1)),
           cache_rays_(p.integer("cache_rays", 16, 1 << 20)) {
         const auto refuse = [&](const char* why) {
             throw std::runtime_error(fmt::format("{}: {}", p.integrator(), why));
         };
-        if (!(radius_ >= 0)) refuse("radius must not be negative");
         if (cache_error_ > 0 && p.integer("max_depth") >= 0)
             refuse("an irradiance cache contains paths of all lengths: expected max_depth=-1");
         if (cache_error_ > 0 && gather_rays_ == 0)

@@ -17,10 +17,16 @@ std::vector<ParamInfo> radius_params(const char* doc) {
              "the image stays biased."}};
 }
 
+float radius_param(const IntegratorParams& p) {
+    constexpr float kLeast = 1e-15f, kLargest = 1e15f;
+    const float radius = p.number("radius");
+    if (radius == 0 || (radius >= kLeast && radius <= kLargest)) return radius;
+    throw std::runtime_error(fmt::format("{}: radius must be 0 or lie in [{:g}, {:g}], but is {:g}",
+                                         p.integrator(), kLeast, kLargest, radius));
+}
+
 RadiusParams::RadiusParams(const IntegratorParams& p)
-    : first(p.number("radius")), alpha(p.number("alpha")) {
-    if (!(first >= 0))
-        throw std::runtime_error(fmt::format("{}: radius must not be negative", p.integrator()));
+    : first(radius_param(p)), alpha(p.number("alpha")) {
     if (!(alpha > 0 && alpha <= 1))
         throw std::runtime_error(fmt::format("{}: alpha must lie in (0, 1]", p.integrator()));
 }

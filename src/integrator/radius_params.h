@@ -11,6 +11,10 @@ namespace etendue {
 /// `doc` is the description of the parameter `radius`.
 std::vector<ParamInfo> radius_params(const char* doc);
 
+/// The parameter `radius`, in units of the scene; 0: the default of the method. Throws where its square, or the inverse of its
+/// square, would leave the range of float.
+float radius_param(const IntegratorParams& params);
+
 /// Values given by the user.
 struct RadiusParams {
     float first;  ///< Radius of the first pass; 0: the default of the method.

@@ -17,6 +17,7 @@
 #include "integrator/bdpt.h"
 #include "integrator/light_path_options.h"
 #include "integrator/pair_pilot.h"
+#include "integrator/radius_params.h"
 #include "integrator/seen_extent.h"
 #include "reuse/gather.h"
 #include "reuse/gather_constants.h"
@@ -38,14 +39,10 @@ class UpgIntegrator final : public Integrator {
 public:
     UpgIntegrator(const IntegratorParams& p, bool connects)
         : paths_(p, Guiding(p), connects ? Specular(p) : Specular()),
-          given_radius_(p.number("radius")), connects_(connects), light_(p),
+          given_radius_(radius_param(p)), connects_(connects), light_(p),
           bound_(p.choice("bound", kBounds)),
           flatness_(bound_ == TrialBound::Slab ? kGatherConstants.flatness : 1.0f),
-          rule_(p.choice("drop", kRules)) {
-        if (!(given_radius_ >= 0))
-            throw std::runtime_error(
-                fmt::format("{}: radius must not be negative", p.integrator()));
-    }
+          rule_(p.choice("drop", kRules)) {}
 
     void learn(const LearnContext& pass) override {
         paths_.learn(pass);

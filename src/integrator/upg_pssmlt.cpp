@@ -18,6 +18,7 @@
 #include "integrator/bdpt.h"
 #include "integrator/light_path_options.h"
 #include "integrator/markov.h"
+#include "integrator/radius_params.h"
 #include "integrator/seen_extent.h"
 #include "math/hash.h"
 #include "mcmc/whole_film.h"
@@ -239,11 +240,8 @@ class UpgPssmltIntegrator final : public MarkovIntegrator {
 public:
     explicit UpgPssmltIntegrator(const IntegratorParams& p)
         : MarkovIntegrator(p, DepthOptions::from(p), {.correlation = 10, .cost = 6}), light_(p),
-          given_radius_(p.number("radius")) {
+          given_radius_(radius_param(p)) {
         options_.starts = Starts::EachPass;
-        if (!(given_radius_ >= 0))
-            throw std::runtime_error(
-                fmt::format("{}: radius must not be negative", p.integrator()));
     }
 
     uint64_t light_path_memory() const override { return light_.memory; }

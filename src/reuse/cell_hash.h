@@ -19,9 +19,9 @@ public:
         friend bool operator==(const Cell&, const Cell&) = default;
     };
     /// Has about twice as many buckets as `points`, and cells of width 2·radius, so that a ball of `radius` meets eight
-    /// cells.
+    /// cells. The width is limited, so that its inverse is finite.
     constexpr CellHash(size_t points = 0, float radius = 1)
-        : inv_width_(0.5f / radius),
+        : inv_width_(0.5f / std::max(radius, 1e-30f)),
           mask_(uint32_t(std::bit_ceil(std::clamp<size_t>(2 * points, 1, size_t(1) << 31)) - 1)) {}
 
     float width() const { return 1 / inv_width_; }

@@ -1,5 +1,6 @@
 #include "integrator/integrator.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "error_of.h"
@@ -19,6 +20,17 @@ TEST(IntegratorParams, NumbersAreFinite) {
                           "\": parameter \"radius\" must be a finite number, but is \"" + value +
                           "\"");
     EXPECT_EQ(error_of_spec("vcm:radius=0.1"), "");
+}
+
+/// Otherwise areas of discs would be 0 or infinite.
+TEST(IntegratorParams, RadiiHaveSquares) {
+    for (const char* name : {"vcm", "sppm", "ppm", "upg", "upg+bdpt", "upg+pssmlt", "pm"})
+        for (const char* value : {"-1", "1e-16", "1e16", "1e-40"})
+            EXPECT_EQ(error_of_spec(std::string(name) + ":radius=" + value),
+                      std::string(name) + ": radius must be 0 or lie in [1e-15, 1e+15], but is " +
+                          fmt::format("{:g}", std::stof(value)));
+    for (const char* value : {"0", "1e-15", "1e15"})
+        EXPECT_EQ(error_of_spec(std::string("upg+bdpt:radius=") + value), "");
 }
 
 /// Methods without the parameter rr_depth have no roulette.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include <gtest/gtest.h>
 
@@ -19,6 +20,17 @@ std::vector<PointGrid::Entry> points(int count, uint64_t seed) {
     std::vector<PointGrid::Entry> entries;
     for (int i = 0; i < count; ++i) entries.push_back({random.in_cube(), uint32_t(i)});
     return entries;
+}
+
+/// The inverse of its width is finite.
+TEST(CellHash, BallsOfAnyRadiusMeetFewCells) {
+    for (float radius : {1e-40f, 1e-30f, 1.0f, 1e30f}) {
+        int cells = 0;
+        CellHash(100, radius).for_each_near({1, -2, 3}, radius, [&](const CellHash::Cell&) {
+            if (++cells > 100) throw std::runtime_error("too many cells");
+        });
+        EXPECT_LE(cells, 27) << radius;
+    }
 }
 
 /// Few points have fewer buckets than a ball meets cells; none must be found twice.
