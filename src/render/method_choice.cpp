@@ -28,7 +28,7 @@ using Clock = std::chrono::steady_clock;
 /// Pixels of the first film of pilots, and of the largest one. From one to the next, there are kGrowth times as many, so
 /// that the last pilots take most of the time.
 constexpr double kFirstPixels = 768, kMostPixels = 49152, kGrowth = 4;
-/// Candidates with a larger error, relative to the best, take no part in the next pilots.
+/// Candidates with a larger error, relative to the geometric mean of the two best, take no part in the next pilots.
 constexpr double kHopeless = 3;
 /// Chains of pilots are short, and see less of where chains stay. On veach-ajar, veach-bidir and two-rooms, the errors of `mlt`
 /// after 60 s are 0.6 to 3 times those predicted without this factor.
@@ -36,6 +36,8 @@ constexpr double kLongChains = 1.5;
 /// Sobol' points gain less with guided walks than without, which the few passes of pilots do not show: on cornell, the noise
 /// of `path` with a guide after 128 passes is 1.06 times that without, where pilots show 0.75.
 constexpr double kLongSequences = 1.1;
+/// Pairs that an eye path finds on large films, where radii are learned: 9 to 12 on three scenes, from 12 wanted in the first pass.
+constexpr double kWantedPairs = 10;
 /// Walks of each kind that train the guide of a pilot, at least. More of them, up to those of the rendering, train it where this
 /// takes at most a part of what guides may take.
 constexpr uint64_t kLeastWalks = 16384;
@@ -72,7 +74,8 @@ struct Contender {
     /// Of the last pilot; 0: there was none.
     struct History {
         double image_noise = 0;
-        double start_a_pixel = 0;  ///< Simulated seconds of MethodPilot::start_seconds.
+        // Simulated seconds:
+        double pass_a_pixel = 0, start_a_pixel = 0;
     } history = {};
     double prepared_seconds = 0;  ///< Simulated, of what its first pilot has prepared.
 
@@ -125,10 +128,18 @@ struct Contender {
         small.guide = guide;
         return small;
     }
+    /// Simulated seconds of a sample in the rendering, whose film has `ratio` times as many pixels as that of the last pilot. The
+    /// more light paths there are in a pass, the more pairs are found, until there are as many as gathers want.
+    double sample_seconds(double pixels, double ratio) const {
+        const double more = candidate_method(name()).gathers && pilot.pairs_an_eye_path > 0
+                                ? std::clamp(kWantedPairs / pilot.pairs_an_eye_path, 1.0, ratio)
+                                : 1.0;
+        return (pilot.pass_seconds + (more - 1) * pilot.pair_seconds) / pixels;
+    }
     /// Simulated seconds of pilots on a film of so many pixels, where it has had one already.
     double pilot_seconds(double pixels) const {
         return kPilotReplicates * pixels *
-               (kPilotPasses * shown.sample_seconds + history.start_a_pixel);
+               (kPilotPasses * history.pass_a_pixel + history.start_a_pixel);
     }
 };
 
@@ -394,11 +405,13 @@ private:
         for (Contender& c : contenders_) {
             MethodPilot& p = c.pilot;
             c.history.start_a_pixel = p.start_seconds / pixels;
+            c.history.pass_a_pixel = p.pass_seconds / pixels;
             c.shown.pixels = width * height;
             c.shown.images = int(p.images.images.size());
-            c.shown.sample_seconds = p.pass_seconds / pixels;
+            c.shown.sample_seconds = c.sample_seconds(pixels, ratio);
             c.shown.start_seconds = start_seconds(c, pixels);
-            const double image = double(p.passes_per_image) * p.pass_seconds * ratio;
+            const double image =
+                double(p.passes_per_image) * c.shown.sample_seconds * pixels * ratio;
             // If there is no time left after the start, the method is hopeless.
             p.images.horizon = std::max(0.01, (budget_.seconds() - c.shown.start_seconds) /
                                                   std::max(image, 1e-12));
@@ -481,7 +494,11 @@ private:
     }
 
     void drop_hopeless() {
-        const double most = kHopeless * contenders_.front().shown.error();
+        // On small films one of the best may be there by luck.
+        const auto error_of = [&](size_t i) { return contenders_[i].shown.error(); };
+        const double most =
+            kHopeless *
+            std::sqrt(error_of(0) * error_of(std::min<size_t>(1, contenders_.size() - 1)));
         for (size_t i = contenders_.size(); i-- > 1;) {
             // What a larger film may show at best.
             const double gain = contenders_[i].reuses_light_paths() ? sqr(kMostGainOfReuse) : 1;

@@ -62,6 +62,15 @@ GuideUse use_of(const Guide* guide) {
     return guide->guides_surfaces() ? GuideUse::WithSurfaces : GuideUse::WithoutSurfaces;
 }
 
+/// What counts for pairs alone. Shadow rays that are blocked are not told from others.
+RenderStats of_pairs(const RenderStats& all) {
+    RenderStats pairs;
+    pairs.pairs = all.pairs;
+    pairs.shadow_rays = all.visible_pairs;
+    pairs.trial_rays = all.trial_rays;
+    return pairs;
+}
+
 /// Renders replicate r of a pilot that must not take more than `most` simulated seconds.
 void add_replicate(const Scene& small, RenderSettings settings, uint64_t first, int r, double most,
                    const std::atomic<bool>& drop, MethodPilot& pilot) {
@@ -80,15 +89,17 @@ void add_replicate(const Scene& small, RenderSettings settings, uint64_t first, 
     const uint64_t first_image = renderer.integrator().is_learning() ? 1 : 0,
                    costs_from = groups > 0 ? uint64_t(groups) : 1;
     ReplicateImages made(groups, first_image);
-    double first_seconds = 0;
+    RenderStats first_stats;
     const StopReason reason = renderer.run(
         settings,
         [&](const Progress& p) {
             made.add(renderer.film(), p.passes - 1);
-            if (p.passes == costs_from) first_seconds = cost(renderer.stats());
+            if (p.passes == costs_from) first_stats = renderer.stats();
         },
         drop, drop);
-    const double prepared = cost(renderer.preparation()), seconds = cost(renderer.stats());
+    const RenderStats& stats = renderer.stats();
+    const double prepared = cost(renderer.preparation()), seconds = cost(stats),
+                 first_seconds = cost(first_stats);
     if (reason == StopReason::Interrupted) {
         if (drop.load()) throw PassDropped();
         // What it was allowed to take, since what threads have done until then depends on their number.
@@ -101,8 +112,14 @@ void add_replicate(const Scene& small, RenderSettings settings, uint64_t first, 
     pilot.images.in_sequence =
         settings.sampler == SamplerKind::Sobol && groups == 0 ? int(made.images.size()) : 1;
     for (auto& image : made.images) pilot.images.images.push_back(std::move(image));
-    const double pass = (seconds - first_seconds) / double(kPilotPasses - costs_from);
+    const double passes = double(kPilotPasses - costs_from),
+                 pass = (seconds - first_seconds) / passes;
     pilot.pass_seconds += pass / kPilotReplicates;
+    const double replicates = kPilotReplicates;
+    pilot.pairs_an_eye_path += double(stats.pairs - first_stats.pairs) /
+                               std::max(1.0, double(stats.eye_paths - first_stats.eye_paths)) /
+                               replicates;
+    pilot.pair_seconds += (cost(of_pairs(stats)) - cost(of_pairs(first_stats))) / passes / replicates;
     pilot.prepared_seconds += prepared;
     pilot.all_seconds += prepared + seconds;
     pilot.start_seconds +=

@@ -28,7 +28,7 @@ TEST(IntegratorParams, RadiiHaveSquares) {
         for (const char* value : {"-1", "1e-16", "1e16", "1e-40"})
             EXPECT_EQ(error_of_spec(std::string(name) + ":radius=" + value),
                       std::string(name) + ": radius must be 0 or lie in [1e-15, 1e+15], but is " +
-                          fmt::format("{:g}", std::stof(value)));
+                          fmt::format("{:g}", float(std::stod(value))));
     for (const char* value : {"0", "1e-15", "1e15"})
         EXPECT_EQ(error_of_spec(std::string("upg+bdpt:radius=") + value), "");
 }

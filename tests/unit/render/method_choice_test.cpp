@@ -578,6 +578,24 @@ TEST(Pilots, AreStopped) {
     }
 }
 
+/// A film of pilots has few light paths, so that gathers find few pairs there. What a sample takes is predicted for the film of
+/// the rendering.
+TEST(Pilots, PredictTheCostOfPairs) {
+    const Scene scene = build(front_camera(160) + room() + area_lamp());
+    const RenderSettings settings = settings_of(scene, "auto:chains=false", 15);
+    const std::atomic<bool> never{false};
+    const auto choice = with_chosen_method(scene, settings, never).choice;
+    const auto candidate = std::find_if(choice->candidates.begin(), choice->candidates.end(),
+                                        [](const auto& c) { return c.method == "upg+bdpt"; });
+    ASSERT_NE(candidate, choice->candidates.end());
+    ASSERT_GT(candidate->images, 0);
+    ASSERT_LT(4 * candidate->pixels, int(scene.film().pixel_count()));
+    const MethodPilot whole =
+        render_pilot(scene, settings_of(scene, "upg+bdpt", 1), 0, kNoLimit, never);
+    const double real = whole.pass_seconds / double(scene.film().pixel_count());
+    EXPECT_NEAR(candidate->sample_seconds, real, 0.2 * real);
+}
+
 /// What is decided about specular connections, and what the first pass costs more.
 TEST(Pilots, BookWhatPrecedesTheFirstPass) {
     const Scene scene = build(lantern_room(front_camera(24)));
