@@ -185,19 +185,20 @@ std::optional<PowerLaw> mean_slope(const Method& m, const Get& get, std::vector<
     return PowerLaw{mean(slopes), std::exp(log_factor / double(slopes.size())), points};
 }
 
-/// Relative standard error of the mean over the runs of the images' means; infinite where it is unknown.
-double error_of_mean(const Method& m) {
-    if (!m.folder.empty()) {
-        Moments ratios;
-        for (const Run& r : m.runs) ratios.add(r.errors().mean_ratio);
-        return ratios.count() > 1 && ratios.mean() > 0
-                   ? std::sqrt(ratios.squared_error()) / ratios.mean()
-                   : std::numeric_limits<double>::infinity();
-    }
-    double variance = 0;
+/// Square of the relative standard error of the mean over the runs of the images' means; infinite where it is unknown.
+SquaredError error_of_mean(const Method& m) {
+    const auto runs = double(m.runs.size());
+    std::vector<SquaredError> errors;
     for (const Run& r : m.runs)
-        variance += r.mean.mean > 0 ? sqr(r.mean.standard_error / r.mean.mean) : 0;
-    return std::sqrt(variance) / double(m.runs.size());
+        if (r.mean.standard_error && r.mean.mean > 0)
+            errors.push_back(
+                {sqr(*r.mean.standard_error / r.mean.mean / runs), double(r.mean.count - 1)});
+    if (errors.size() == m.runs.size()) return sum(errors);
+    // The spread of the runs remains.
+    Moments ratios;
+    for (const Run& r : m.runs) ratios.add(r.errors().mean_ratio);
+    if (ratios.count() < 2 || !(ratios.mean() > 0)) return kUnknownError;
+    return {ratios.squared_error() / sqr(ratios.mean()), double(ratios.count() - 1)};
 }
 
 }  // namespace
@@ -381,7 +382,7 @@ std::vector<MethodSummary> summarize(const Comparison& comparison) {
 
         s.mean_ratio =
             ratio_interval(mean(of_runs(m, [](const Run& r) { return r.errors().mean_ratio; })),
-                           error_of_mean(m), comparison.reference.mean_relative_error);
+                           error_of_mean(m), comparison.reference.mean_error);
 
         std::vector<double> rmse_slopes, slopes;
         s.rmse_slope = mean_slope(

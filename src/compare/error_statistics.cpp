@@ -4,8 +4,6 @@
 #include <cmath>
 #include <vector>
 
-#include "math/statistics.h"
-
 namespace etendue {
 namespace {
 
@@ -65,9 +63,13 @@ std::optional<Efficiency> relative_efficiency(std::span<const double> base,
     return out;
 }
 
-Interval ratio_interval(double ratio, double relative_error_x, double relative_error_r) {
-    const double half =
-        kNormalQuantile95 * std::fabs(ratio) * std::hypot(relative_error_x, relative_error_r);
+Interval ratio_interval(double ratio, const SquaredError& x, const SquaredError& r) {
+    const SquaredError errors[] = {x, r};
+    const SquaredError error = sum(errors);
+    // The quantile of unknown errors does not exist.
+    const double half = std::isfinite(error.value) ? student_quantile(0.05, error.dof) *
+                                                         std::fabs(ratio) * std::sqrt(error.value)
+                                                   : error.value;
     return {ratio, ratio - half, ratio + half};
 }
 

@@ -4,6 +4,8 @@
 #include <optional>
 #include <span>
 
+#include "math/statistics.h"
+
 namespace etendue {
 
 /// A value and its two-sided 95 % confidence interval.
@@ -34,7 +36,8 @@ struct Efficiency {
 std::optional<Efficiency> relative_efficiency(std::span<const double> base,
                                               std::span<const double> method);
 
-/// Interval of the ratio X / R of two independent means, from their relative standard errors.
-Interval ratio_interval(double ratio, double relative_error_x, double relative_error_r);
+/// Interval of the ratio X / R of two independent means, from the squares of their relative standard errors. It is infinite
+/// where one of them is.
+Interval ratio_interval(double ratio, const SquaredError& x, const SquaredError& r);
 
 }  // namespace etendue

@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Version of cached references; increased when older ones can no longer be used.
-constexpr uint64_t kFormat = 2;
+constexpr uint64_t kFormat = 3;
 /// Unlikely as a seed on the command line, so that no method shares the reference's random numbers.
 constexpr uint64_t kSeed = 0x7265666572656e63;
 
@@ -39,6 +39,37 @@ std::vector<Rgb> mean_of(const std::vector<Rgb>& a, const std::vector<Rgb>& b) {
     std::vector<Rgb> mean(a.size());
     for (size_t i = 0; i < a.size(); ++i) mean[i] = (a[i] + b[i]) * 0.5f;
     return mean;
+}
+
+bool has(const Image& image, const std::string& name) {
+    return image.attributes.contains("etendue." + name);
+}
+
+/// Reference::mean_error of an image that was read.
+SquaredError error_of_mean(const Image& image) {
+    if (has(image, "mean_relative_error_dof"))
+        return {sqr(number(image, "mean_relative_error")),
+                number(image, "mean_relative_error_dof")};
+    const double mean = number(image, "mean_luminance");
+    if (!(mean > 0)) return {};
+    // Images of earlier versions have an error without the number of its values, and 0 for an unknown one.
+    const double count =
+        number(image, has(image, "mean_luminance_count") ? "mean_luminance_count" : "spp");
+    if (!has(image, "mean_luminance_standard_error") || !(count > 1)) return kUnknownError;
+    return {sqr(number(image, "mean_luminance_standard_error") / mean), count - 1};
+}
+
+/// Of the mean of two renderings. If they are too short, the difference between them remains.
+SquaredError error_of_halves(const Film::MeanEstimate (&halves)[2]) {
+    const double mean = (halves[0].mean + halves[1].mean) / 2;
+    if (!(mean > 0)) return kUnknownError;
+    SquaredError errors[2];
+    for (int i = 0; i < 2; ++i) {
+        const Film::MeanEstimate& half = halves[i];
+        if (!half.standard_error) return {sqr((halves[0].mean - halves[1].mean) / 2 / mean), 1};
+        errors[i] = {sqr(*half.standard_error / 2 / mean), double(half.count - 1)};
+    }
+    return sum(errors);
 }
 
 /// (X − R − σ)(X − R + σ) = (X − R)² − σ².
@@ -77,7 +108,8 @@ void write_reference(const Reference& r, const RenderStats& stats) {
     image.attributes["etendue.integrator"] = r.method;
     image.attributes["etendue.seconds"] = r.seconds;
     image.attributes["etendue.spp"] = double(r.spp);
-    image.attributes["etendue.mean_relative_error"] = r.mean_relative_error;
+    image.attributes["etendue.mean_relative_error"] = std::sqrt(r.mean_error.value);
+    image.attributes["etendue.mean_relative_error_dof"] = r.mean_error.dof;
     // Named as in images that `render` writes.
     image.attributes["etendue.rejected_contributions"] = double(stats.rejected);
     image.attributes["etendue.runaways"] = double(stats.runaways);
@@ -102,14 +134,12 @@ Reference read_reference(const std::string& file, const FilmGeometry& geometry) 
     r.method = text(image, "integrator");
     r.seconds = number(image, "seconds");
     r.spp = uint64_t(number(image, "spp"));
-    r.mean_relative_error = number(image, "mean_relative_error");
+    r.mean_error = error_of_mean(image);
     RenderStats stats;
     stats.rejected = uint64_t(number(image, "rejected_contributions"));
     stats.runaways = uint64_t(number(image, "runaways"));
     stats.bounds_exceeded = uint64_t(number(image, "bounds_exceeded"));
     r.warnings = warnings(stats);
-    if (const double mean = number(image, "mean_luminance"); mean > 0)
-        r.mean_relative_error = number(image, "mean_luminance_standard_error") / mean;
     if (image.channel("first.R") >= 0 && image.channel("second.R") >= 0) {
         r.first = rgb_pixels(image, "first");
         r.second = rgb_pixels(image, "second");
@@ -139,7 +169,7 @@ std::optional<Reference> make_reference(const Scene& scene, const ReferenceSetti
     r.width = scene.film().crop_width;
     r.height = scene.film().crop_height;
     r.method = settings.render.integrator.to_string();
-    double mean = 0, variance = 0;
+    Film::MeanEstimate means[2];
     RenderStats stats;
     for (int i = 0; i < 2; ++i) {
         RenderSettings half = settings.render;
@@ -152,12 +182,10 @@ std::optional<Reference> make_reference(const Scene& scene, const ReferenceSetti
         r.seconds += renderer.seconds();
         r.spp += renderer.film().passes();
         stats += renderer.stats();
-        const Film::MeanEstimate m = renderer.film().mean_luminance();
-        mean += m.mean / 2;
-        variance += m.standard_error * m.standard_error / 4;
+        means[i] = renderer.film().mean_luminance();
     }
     r.pixels = mean_of(r.first, r.second);
-    if (mean > 0) r.mean_relative_error = std::sqrt(variance) / mean;
+    r.mean_error = error_of_halves(means);
     r.warnings = warnings(stats);
     // Otherwise, it serves this comparison all the same.
     const std::string failure = failure_of([&] { write_reference(r, stats); });

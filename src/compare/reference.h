@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "description/fingerprint.h"
+#include "math/statistics.h"
 #include "render/renderer.h"
 
 namespace etendue {
@@ -18,8 +19,9 @@ struct Reference {
     /// Two images with mean `pixels` for which E[(X − first)(X − second)] does not contain the reference's variance:
     /// independent halves, or `pixels` ± standard error. Empty where the variance is unknown.
     std::vector<Rgb> first, second;
-    /// Relative standard error of the mean luminance; 0 where it is unknown.
-    double mean_relative_error = 0;
+    /// Square of the relative standard error of the mean luminance; 0 for images of other programs, which are compared as
+    /// if they were exact, and infinite where a rendering of this program is too short to tell.
+    SquaredError mean_error;
     std::string file;    ///< The file that it was read from or is cached in.
     std::string method;  ///< The integrator that rendered it; empty where it is unknown.
     double seconds = 0;

@@ -58,7 +58,8 @@ Json to_json(const Run& r) {
             {"vertices", r.stats.vertices},
             {"rejected_contributions", r.stats.rejected},
             {"mean_luminance", r.mean.mean},
-            {"mean_luminance_standard_error", r.mean.standard_error},
+            {"mean_luminance_standard_error",
+             r.mean.standard_error ? Json(*r.mean.standard_error) : Json()},
             {"errors", to_json(r.errors())},
             {"errors_with_reference_noise", to_json(r.uncorrected)},
             {"checkpoints", checkpoints}};
@@ -324,7 +325,7 @@ Json to_json(const Comparison& c) {
               {"variance_known", r.has_variance()},
               {"mse", c.reference_mse},
               {"rel_mse", c.reference_rel_mse},
-              {"mean_relative_error", r.mean_relative_error},
+              {"mean_relative_error", std::sqrt(r.mean_error.value)},
               {"warnings", r.warnings}}},
             {"methods", methods}};
 }

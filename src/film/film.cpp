@@ -381,12 +381,14 @@ Film::MeanEstimate Film::mean_luminance() const {
             means.add(sum / (double(group_passes_[g]) * double(moments_.size())));
         }
         m.standard_error = std::sqrt(means.squared_error());
+        m.count = means.count();
         return m;
     }
     if (n < 2) return m;
     double square = 0;
     for (double v : pass_means_) square += sqr(v - m.mean);
     m.standard_error = std::sqrt(square / (n * (n - 1)));
+    m.count = int64_t(pass_means_.size());
     return m;
 }
 

@@ -3,6 +3,7 @@
 // normalisation (number of light paths, crop, filter).
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -149,7 +150,11 @@ public:
     int groups() const { return int(group_sums_.size()); }
     /// Mean luminance of the crop, and its standard error.
     struct MeanEstimate {
-        double mean = 0, standard_error = 0;
+        double mean = 0;
+        /// Empty with fewer than two passes, and until every group has had one.
+        std::optional<double> standard_error;
+        /// Number of independent values from whose spread the error is estimated: passes, or groups.
+        int64_t count = 0;
     };
     MeanEstimate mean_luminance() const;
     /// Contributions that were not finite and were left out.

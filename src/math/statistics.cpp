@@ -1,7 +1,6 @@
 #include "math/statistics.h"
 
 #include <algorithm>
-#include <limits>
 
 #include <boost/math/distributions/students_t.hpp>
 
@@ -34,13 +33,21 @@ double student_quantile(double p, double dof) {
     return quantile(complement(StudentsT(dof), p / 2));
 }
 
-double welch_dof(const Moments& a, const Moments& b) {
-    const double va = a.squared_error(), vb = b.squared_error();
+SquaredError sum(std::span<const SquaredError> errors) {
+    SquaredError all;
     double denominator = 0;
-    if (va > 0) denominator += va * va / double(a.count() - 1);
-    if (vb > 0) denominator += vb * vb / double(b.count() - 1);
-    return denominator > 0 ? (va + vb) * (va + vb) / denominator
-                           : std::numeric_limits<double>::infinity();
+    for (const SquaredError& e : errors) {
+        all.value += e.value;
+        if (e.value > 0) denominator += e.value * e.value / e.dof;
+    }
+    if (denominator > 0) all.dof = all.value * all.value / denominator;
+    return all;
+}
+
+double welch_dof(const Moments& a, const Moments& b) {
+    const SquaredError errors[] = {{a.squared_error(), double(a.count() - 1)},
+                                   {b.squared_error(), double(b.count() - 1)}};
+    return sum(errors).dof;
 }
 
 double welch_p(const Moments& a, const Moments& b, double tolerance) {

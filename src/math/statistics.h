@@ -3,6 +3,8 @@
 
 #include <cmath>
 #include <cstdint>
+#include <limits>
+#include <span>
 #include <vector>
 
 namespace etendue {
@@ -50,6 +52,14 @@ double student_quantile(double p, double dof);
 
 /// Two-sided 95 % quantile of the normal distribution.
 inline constexpr double kNormalQuantile95 = 1.959964;
+
+/// Variance of a mean, estimated with some degrees of freedom: infinitely many where it is known.
+struct SquaredError {
+    double value = 0, dof = std::numeric_limits<double>::infinity();
+};
+inline constexpr SquaredError kUnknownError{std::numeric_limits<double>::infinity(), 0};
+/// That of a sum or difference of independent means [Welch 1947].
+SquaredError sum(std::span<const SquaredError> errors);
 
 /// Degrees of freedom of the difference of two means [Welch 1947]; infinite where both are exact.
 double welch_dof(const Moments& a, const Moments& b);

@@ -43,7 +43,9 @@ nlohmann::json statistics(const Film& film, const RenderStats& s, double seconds
         {"rejected_contributions", s.rejected},
         {"warnings", warnings(s)},
         {"mean_luminance", mean.mean},
-        {"mean_luminance_standard_error", mean.standard_error},
+        {"mean_luminance_standard_error",
+         mean.standard_error ? nlohmann::json(*mean.standard_error) : nlohmann::json()},
+        {"mean_luminance_count", mean.count},
     };
     const PhaseSeconds& p = s.phases;
     j["phase_seconds"] = {{"light_paths", p.light_paths},

@@ -39,7 +39,8 @@ double pixel_correlation(const Image& image, const std::vector<Rgb>& variance, c
     const auto error = image.attributes.find("etendue.mean_luminance_standard_error");
     const auto* standard_error =
         error == image.attributes.end() ? nullptr : std::get_if<double>(&error->second);
-    if (!standard_error) return correlation;
+    // Images of earlier versions have 0 where it is unknown.
+    if (!standard_error || *standard_error == 0) return correlation;
     // Channels are positively correlated, so this underestimates the error of luminance, and the factor is never too
     // small.
     const float r = luminance({1, 0, 0}), g = luminance({0, 1, 0}), b = luminance({0, 0, 1});

@@ -253,7 +253,7 @@ TEST_P(ChainSeeds, AgreeWithinTheErrorsThatTheyState) {
         for (size_t k = 0; k < values.size(); ++k) tiles.values[k].add(values[k]);
         const Film::MeanEstimate mean = renderer.film().mean_luminance();
         means.add(mean.mean);
-        stated += sqr(mean.standard_error) / double(seeds);
+        stated += sqr(mean.standard_error.value()) / double(seeds);
     }
     expect_same_image(tiles, render_tiles(scene, "bdpt" + depth, {2048, 1, 1}), 0.1, method);
     const double ratio = means.variance() / stated;

@@ -111,12 +111,14 @@ TEST(MadeReference, IsCachedUntilALongerOneIsRequested) {
     EXPECT_FALSE(first.reused);
     EXPECT_EQ(first.spp, 4u);
     EXPECT_FALSE(same_bits(first.first, first.second));
-    EXPECT_GT(first.mean_relative_error, 0);
+    EXPECT_GT(first.mean_error.value, 0);
+    EXPECT_LE(first.mean_error.dof, 2);
     const Reference again = make(1);
     EXPECT_TRUE(again.reused);
     EXPECT_TRUE(same_bits(first.pixels, again.pixels));
     EXPECT_TRUE(same_bits(first.second, again.second));
-    EXPECT_EQ(again.mean_relative_error, first.mean_relative_error);
+    EXPECT_NEAR(again.mean_error.value, first.mean_error.value, 1e-12 * first.mean_error.value);
+    EXPECT_EQ(again.mean_error.dof, first.mean_error.dof);
     EXPECT_FALSE(make(2).reused) << "another scene";
     EXPECT_FALSE(make(1, 8).reused) << "another build of the program";
     how.spp = 8;
@@ -287,6 +289,57 @@ TEST(MeanRatio, IntervalHoldsOneForAnUnbiasedMethod) {
     EXPECT_LE(m.mean_ratio.low, 1);
     EXPECT_GE(m.mean_ratio.high, 1);
     EXPECT_LT(m.mean_ratio.high - m.mean_ratio.low, 0.2);
+}
+
+/// A single pass has no spread: several runs have, whose interval is wide.
+TEST(MeanRatio, IntervalOfSinglePassesComesFromTheRuns) {
+    const Scene scene = small_scene();
+    for (const int runs : {1, 2}) {
+        CompareSettings s = settings_of({"path"}, 1);
+        s.runs = runs;
+        const MethodSummary m = summarize(compare(
+                                              scene, white_reference(scene), s,
+                                              [](const std::string&) {}, kNotInterrupted))
+                                    .front();
+        EXPECT_EQ(std::isfinite(m.mean_ratio.low), runs > 1);
+        EXPECT_EQ(std::isfinite(m.mean_ratio.high), runs > 1);
+        EXPECT_LT(m.mean_ratio.low, m.mean_ratio.value);
+    }
+}
+
+/// The halves of such a reference have one pass each.
+TEST(MadeReference, OfTwoSamplesHasTheErrorOfItsHalves) {
+    const TemporaryFolder folder;
+    RenderSettings how;
+    how.integrator = IntegratorSpec::parse("path");
+    how.spp = 2;
+    const Reference r = *make_reference(
+        small_scene(), {how, folder.path().string(), 1, 7}, [](const Progress&) {},
+        kNotInterrupted);
+    EXPECT_GT(r.mean_error.value, 0);
+    EXPECT_EQ(r.mean_error.dof, 1);
+}
+
+/// `render` writes no error of the mean after one pass.
+TEST(ReadReference, OfOneSampleHasAnUnknownError) {
+    const TemporaryFolder folder;
+    const std::string file = (folder.path() / "r.exr").string();
+    Image image = rgb_image(8, 8, std::vector<Rgb>(64, Rgb(1)));
+    const FilmGeometry film{8, 8, 0, 0, 8, 8};
+    write_image(file, image);
+    EXPECT_EQ(read_reference(file, film).mean_error.value, 0) << "another program's";
+    image.attributes["etendue.mean_luminance"] = 1.0;
+    image.attributes["etendue.spp"] = 1.0;
+    write_image(file, image);
+    EXPECT_FALSE(std::isfinite(read_reference(file, film).mean_error.value));
+    image.attributes["etendue.mean_luminance_standard_error"] = 0.5;
+    image.attributes["etendue.spp"] = 4.0;
+    write_image(file, image);
+    EXPECT_EQ(read_reference(file, film).mean_error.value, 0.25);
+    EXPECT_EQ(read_reference(file, film).mean_error.dof, 3);
+    image.attributes["etendue.mean_luminance_count"] = 2.0;
+    write_image(file, image);
+    EXPECT_EQ(read_reference(file, film).mean_error.dof, 1);
 }
 
 /// They are rendered in less time, for which `auto` would choose without pilots.

@@ -1,6 +1,7 @@
 #include "compare/error_statistics.h"
 
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -94,9 +95,39 @@ TEST(Efficiency, IntervalHoldsTheTruth) {
 }
 
 TEST(RatioInterval, AddsRelativeVariances) {
-    const Interval i = ratio_interval(2, 0.03, 0.04);
+    const Interval i = ratio_interval(2, {0.03 * 0.03}, {0.04 * 0.04});
     EXPECT_NEAR(i.high - i.value, kNormalQuantile95 * 2 * 0.05, 1e-12);
-    EXPECT_NEAR(i.value - i.low, kNormalQuantile95 * 2 * 0.05, 1e-12);
+    EXPECT_NEAR(i.value - i.low, kNormalQuantile95 * 2 * 0.05, 1e-6);
+}
+
+TEST(RatioInterval, IsUnknownWhereAnErrorIs) {
+    for (const Interval& i :
+         {ratio_interval(2, kUnknownError, {}), ratio_interval(2, {0.01, 3}, kUnknownError)}) {
+        EXPECT_EQ(i.low, -std::numeric_limits<double>::infinity());
+        EXPECT_EQ(i.high, std::numeric_limits<double>::infinity());
+    }
+}
+
+/// Whatever the number of samples.
+TEST(RatioInterval, HasItsLevel) {
+    constexpr int kTrials = 4000;
+    Random random(5);
+    for (const int samples : {2, 3, 8}) {
+        int inside = 0;
+        for (int trial = 0; trial < kTrials; ++trial) {
+            Moments x, r;
+            for (int k = 0; k < samples; ++k) x.add(1 + 0.02 * normal(random));
+            for (int k = 0; k < 200; ++k) r.add(1 + 0.02 * normal(random));
+            const auto error = [](const Moments& m) {
+                return SquaredError{m.squared_error() / (m.mean() * m.mean()),
+                                    double(m.count() - 1)};
+            };
+            const Interval i = ratio_interval(x.mean() / r.mean(), error(x), error(r));
+            inside += i.low <= 1 && 1 <= i.high;
+        }
+        EXPECT_GE(double(inside) / kTrials, 0.935) << samples;
+        EXPECT_LE(double(inside) / kTrials, 0.965) << samples;
+    }
 }
 
 }  // namespace

@@ -147,7 +147,26 @@ TEST(Film, ImageAndVarianceAreThoseOfThePasses) {
     }
     EXPECT_EQ(film.passes(), 9u);
     EXPECT_NEAR(film.mean_luminance().mean, whole.mean(), 1e-6);
-    EXPECT_NEAR(film.mean_luminance().standard_error, std::sqrt(whole.squared_error()), 1e-6);
+    EXPECT_NEAR(film.mean_luminance().standard_error.value(), std::sqrt(whole.squared_error()),
+                1e-6);
+    EXPECT_EQ(film.mean_luminance().count, 9);
+}
+
+/// One pass has no spread, and chains have none until each of them has had a pass.
+TEST(Film, ErrorOfTheMeanIsUnknownAtFirst) {
+    for (const int groups : {0, 4}) {
+        Film film(kGeometry, ReconstructionFilter::box());
+        if (groups > 0) film.set_groups(groups);
+        const int enough = std::max(groups, 2);
+        for (int pass = 0; pass < 2 * enough; ++pass) {
+            EXPECT_EQ(film.mean_luminance().standard_error.has_value(), pass >= enough)
+                << groups << " groups, " << pass << " passes";
+            film.begin_pass(0);
+            film.add_eye(0, Rgb(float(pass % 3)));
+            film.end_pass();
+        }
+        EXPECT_EQ(film.mean_luminance().count, groups > 0 ? groups : 2 * enough);
+    }
 }
 
 /// Pixels of one expectation and known variance, so that the relative error is known.
@@ -247,7 +266,7 @@ TEST(Film, ErrorIsThatOfGroups) {
         EXPECT_LT(film.error().low, film.error().relative_rms);
         EXPECT_GT(film.error().high, film.error().relative_rms);
         for (const Rgb& v : film.variance()) variance.add(double(v.g));
-        mean_error2.add(sqr(film.mean_luminance().standard_error));
+        mean_error2.add(sqr(film.mean_luminance().standard_error.value()));
     }
     // 1/3 of a group. Of 40 passes eight groups have three and eight two; the difference of two of them is not smaller for
     // it.
