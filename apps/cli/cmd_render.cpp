@@ -585,6 +585,7 @@ void RenderCommand::render(Job& job, const Ranks& ranks) const {
         stopped_by = "failure";
         failure = caught();
     }
+    end_grace();
     // The passes may have taken all of it, and what there is needs some more to be written.
     const UnlimitedMemory unlimited;
     const uint64_t passes = renderer.film().passes();

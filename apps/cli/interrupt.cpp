@@ -14,20 +14,20 @@ namespace {
 // Globals, since a signal handler has no argument through which to reach them.
 std::atomic<bool> stop{false}, drop{false}, is_graceful{false}, ends_at_once{false};
 std::atomic<unsigned> grace_seconds{0};
+/// Handled by on_interrupt(). The time of grace is none of them, though it ends like the second one.
+std::atomic<int> signals{0};
 
 // Temporary folders are removed by the thread that has made them.
 extern "C" void on_interrupt(int signal) {
     if (HeldSignals::pass_on(signal)) return;
     if (ends_at_once) end_at_once(130);
-    if (!stop.exchange(true)) {
-        if (!is_graceful) return;
-        if (grace_seconds > 0)
-            alarm(grace_seconds);
-        else
-            drop = true;
-    } else if (!is_graceful || drop.exchange(true)) {
-        end_at_once(130);
-    }
+    const int earlier = signals++;
+    if (earlier > (is_graceful ? 1 : 0)) end_at_once(130);
+    stop = true;
+    if (earlier == 0 && is_graceful && grace_seconds > 0)
+        alarm(grace_seconds);
+    else if (is_graceful)
+        drop = true;
 }
 extern "C" void on_end(int signal) {
     if (HeldSignals::pass_on(signal)) return;
@@ -80,6 +80,11 @@ Interrupts catch_interrupts(unsigned grace) {
     is_graceful = true;
     std::signal(SIGALRM, on_end_of_grace);
     return {catch_interrupts(), drop};
+}
+
+void end_grace() {
+    grace_seconds = 0;
+    alarm(0);
 }
 
 void catch_signal_of_mpirun() {

@@ -32,9 +32,11 @@ struct Interrupts {
     const std::atomic<bool>&
         drop;  ///< Set by the second signal or after `grace`: abandon that work.
 };
-/// Handles the signals from now on by setting these flags; a further signal once `drop` is set ends the program.
+/// Handles the signals from now on by setting these flags; the third signal ends the program.
 /// `grace`: seconds after the first signal.
 Interrupts catch_interrupts(unsigned grace);
+/// There is no work left that could be abandoned: no alarm interrupts what follows.
+void end_grace();
 /// Handles SIGUSR1 in the same way. mpirun passes this signal on at once.
 void catch_signal_of_mpirun();
 

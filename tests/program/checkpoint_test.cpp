@@ -144,6 +144,30 @@ TEST_F(CheckpointTest, TheThirdSignalEndsTheProgramAtOnce) {
         EXPECT_FALSE(e.path().filename().string().starts_with(".")) << e.path();
 }
 
+/// After the time of grace there is no pass that a second signal could drop, and it loses nothing.
+TEST_F(CheckpointTest, TheSecondSignalLosesNothing) {
+    const std::string pipe = path("pipe.pfm");
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    for (const char* grace : {"0", "1"}) {
+        const std::string state = path(std::string(grace) + ".etd");
+        const Program program =
+            start({"render", scene, "-o", pipe, "--quiet", "--resolution", "16x12", "--time", "600",
+                   "--grace", grace, "--stats", path("a.json"), "--checkpoint", state,
+                   "--checkpoint-every", "1e-6"});
+        wait_for_file(std::string(grace) + ".etd");
+        program.send(SIGTERM);
+        // It now waits for the reader.
+        wait(1.5);
+        program.send(SIGTERM);
+        wait(0.2);
+        const std::string image = read_text(pipe);
+        EXPECT_EQ(program.wait().status, 0) << grace;
+        EXPECT_EQ(image.size(), std::string("PF\n16 12\n-1.0\n").size() + 16 * 12 * 12) << grace;
+        EXPECT_TRUE(fs::exists(path("a.json"))) << grace;
+        fs::remove(path("a.json"));
+    }
+}
+
 /// The program writes what it has waited for, apart from the last image and checkpoint.
 TEST_F(CheckpointTest, StatisticsSayHowLongPassesHaveWaited) {
     expect_run(
