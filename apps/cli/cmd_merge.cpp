@@ -40,8 +40,10 @@ struct MergeCommand {
             refuse_same_file("sum", output, "checkpoint", file);
             refuse_same_file("statistics", stats, "checkpoint", file);
         }
-        // A sum can replace an earlier one, but no other file.
-        if (!is_image) replaces_checkpoint(output);
+        // A sum can replace an earlier one, but no other file: a rendering cannot go on from it.
+        if (!is_image && replaces_checkpoint(output) && !CheckpointFile(output).header().is_merged)
+            throw std::runtime_error(fmt::format(
+                "{} is not replaced by a sum, since it is the checkpoint of a rendering", output));
         OutputFile::check(output);
         if (!stats.empty()) OutputFile::check(stats);
         std::vector<CheckpointFile> parts;

@@ -92,8 +92,10 @@ private:
     }
     /// The checkpoint from which the rendering goes on, if there is one.
     std::optional<CheckpointFile> earlier_checkpoint() const;
-    /// Warns where a checkpoint is to be replaced without having been resumed. No other file is replaced by one.
-    void check_replaced_checkpoint() const;
+    /// Whether a checkpoint is to be replaced without having been resumed. No other file is replaced by one.
+    bool replaces_another_checkpoint() const;
+    /// Says which one is to be replaced.
+    void warn_of_replaced_checkpoint(const Conditions& conditions) const;
     static constexpr const char* kAuto = "auto";
     /// Checks that need no scene.
     void check_options() const;
@@ -291,13 +293,22 @@ std::optional<CheckpointFile> RenderCommand::earlier_checkpoint() const {
     return is_there ? std::optional<CheckpointFile>(checkpoint) : std::nullopt;
 }
 
-void RenderCommand::check_replaced_checkpoint() const {
+bool RenderCommand::replaces_another_checkpoint() const {
     std::error_code error;
     const std::string& file = checkpoint_file();
     const bool is_resumed = resume == kAuto || std::filesystem::equivalent(resume, file, error);
-    if (is_resumed || !replaces_checkpoint(file)) return;
-    print_warnings({fmt::format(
-        "{} is replaced; with --resume auto, the rendering would go on from it", file)});
+    return !is_resumed && replaces_checkpoint(file);
+}
+
+void RenderCommand::warn_of_replaced_checkpoint(const Conditions& conditions) const {
+    const std::string& file = checkpoint_file();
+    std::string what;
+    const std::string damage = failure_of([&] {
+        const std::string obstacle = CheckpointFile(file).obstacle(conditions);
+        what = obstacle.empty() ? "with --resume auto, the rendering would go on from it"
+                                : fmt::format("it could not be resumed: {}", obstacle);
+    });
+    print_warnings({fmt::format("{} is replaced; {}", file, damage.empty() ? what : damage)});
 }
 
 RenderSettings RenderCommand::settings_for(const Scene& s) const {
@@ -457,7 +468,7 @@ std::unique_ptr<RenderCommand::Job> RenderCommand::make_job(const Ranks& ranks) 
         throw std::runtime_error("--preview shows the image of one process, not of several");
     SceneOptions loading = scene;
     loading.threads = request.threads;
-    check_replaced_checkpoint();
+    const bool replaces_another = replaces_another_checkpoint();
     std::optional<CheckpointFile> earlier = earlier_checkpoint();
     const bool needs_conditions = !checkpoint_file().empty() || ranks.count() > 1;
     uint64_t fingerprint = 0;
@@ -485,6 +496,7 @@ std::unique_ptr<RenderCommand::Job> RenderCommand::make_job(const Ranks& ranks) 
     if (needs_conditions)
         job->conditions = conditions_of(renderer, s, {fingerprint, scene.lenient, scene.watertight},
                                         job->settings);
+    if (replaces_another) warn_of_replaced_checkpoint(job->conditions);
     if (earlier) {
         earlier->resume(renderer, job->conditions, job->log);
         if (!quiet)

@@ -125,23 +125,22 @@ std::string partial_result(const Renderer& renderer, const Scene& scene,
     return to.take();
 }
 
-void CheckpointFile::resume(Renderer& renderer, const Conditions& conditions, PassLog& log) {
-    if (header_.is_merged)
-        throw std::runtime_error(fmt::format(
-            "{} cannot be resumed: it is the sum of several renderings (etendue merge)", name()));
-    if (!has_state())
-        throw std::runtime_error(fmt::format(
-            "{} cannot be resumed: it contains the sums of a rendering, but not its state",
-            name()));
+std::string CheckpointFile::obstacle(const Conditions& conditions) const {
+    if (header_.is_merged) return "it is the sum of several renderings (etendue merge)";
+    if (!has_state()) return "it contains the sums of a rendering, but not its state";
     std::vector<std::string> differences;
     for (const auto& [condition_name, own] : conditions)
         if (const std::string theirs = header_.condition(condition_name); theirs != own)
             differences.push_back(
                 fmt::format("{}: \"{}\" there, but \"{}\" here", condition_name, theirs, own));
-    if (!differences.empty())
-        throw std::runtime_error(fmt::format(
-            "{} cannot be resumed, since the rendering would not go on with the same bits; {}",
-            name(), fmt::join(differences, "; ")));
+    return differences.empty() ? ""
+                               : fmt::format("the rendering would not go on with the same bits; {}",
+                                             fmt::join(differences, "; "));
+}
+
+void CheckpointFile::resume(Renderer& renderer, const Conditions& conditions, PassLog& log) {
+    if (const std::string why = obstacle(conditions); !why.empty())
+        throw std::runtime_error(fmt::format("{} cannot be resumed: {}", name(), why));
     renderer.load(reader_);
     if (renderer.film().passes() != header_.passes())
         reader_.fail("the passes are not those of its film");

@@ -58,6 +58,8 @@ public:
     const CheckpointHeader& header() const { return header_; }
     /// Whether a rendering can go on from it. Otherwise it has only sums.
     bool has_state() const { return reader_.has("learned"); }
+    /// Why a rendering with these conditions cannot go on from it, in words; empty if it can.
+    std::string obstacle(const Conditions& conditions) const;
     /// Verifies every byte of the file.
     void check() { reader_.check(); }
 

@@ -372,6 +372,24 @@ TEST_F(CheckpointTest, NothingElseIsReplacedByACheckpoint) {
     EXPECT_NE(merged.errors.find("other.etd is not replaced"), std::string::npos) << merged.errors;
     EXPECT_EQ(read_text(other), "a text");
     for (int i = 0; i < 2; ++i) expect_run({"merge", b, "-o", sum});
+    // A rendering could not go on from a sum.
+    const std::string state = path("state.etd"), before = read_text(b);
+    fs::copy_file(b, state);
+    const ProgramResult replaced = run({"merge", b, "-o", state});
+    EXPECT_EQ(replaced.status, 1);
+    EXPECT_NE(replaced.errors.find("state.etd is not replaced by a sum"), std::string::npos)
+        << replaced.errors;
+    EXPECT_TRUE(read_text(state) == before);
+    // The warning says from what a rendering could go on.
+    for (const auto& [file, more, says] :
+         {std::tuple{sum, Arguments{}, "it is the sum of several renderings"},
+          {state, Arguments{"--seed", "3"}, "seed: \"0\" there, but \"3\" here"}}) {
+        const ProgramResult r = run(arguments(file, more));
+        EXPECT_EQ(r.status, 0);
+        EXPECT_NE(r.errors.find("is replaced; it could not be resumed: "), std::string::npos)
+            << r.errors;
+        EXPECT_NE(r.errors.find(says), std::string::npos) << r.errors;
+    }
     // An earlier one is, with a warning; an empty file is none.
     std::ofstream(path("a.etd")).close();
     EXPECT_EQ(run(arguments(a, {})).errors, "");
