@@ -228,9 +228,16 @@ void RenderCommand::check_options() const {
     check_limits(limits, first_pass);
     if (resume == kAuto && checkpoint.empty())
         throw UsageError("--resume auto requires --checkpoint, the file to resume from");
-    for (const auto& [name, file] :
-         {std::pair{"image", output}, {"checkpoint", checkpoint_file()}, {"statistics", stats}})
+    for (const auto& [name, file] : {std::pair{"image", output},
+                                     {"denoised image", denoise ? denoised_file() : ""},
+                                     {"checkpoint", checkpoint_file()},
+                                     {"statistics", stats}}) {
         refuse_same_file("scene", scene.file, name, file);
+        if (!request.integrator.empty()) refuse_user_paths(request.integrator, name, file);
+        // Further checkpoints may replace it.
+        if (resume != kAuto && name != std::string_view("checkpoint"))
+            refuse_same_file("checkpoint to resume from", resume, name, file);
+    }
     refuse_same_file("image", output, "checkpoint", checkpoint_file());
     refuse_same_file("image", output, "statistics", stats);
     refuse_same_file("checkpoint", checkpoint_file(), "statistics", stats);
@@ -239,9 +246,8 @@ void RenderCommand::check_options() const {
             throw std::runtime_error(fmt::format(
                 "--denoise writes a second image beside {}, which must therefore be a file",
                 output));
-        for (const auto& [name, file] : {std::pair{"scene", scene.file},
-                                         {"checkpoint", checkpoint_file()},
-                                         {"statistics", stats}})
+        for (const auto& [name, file] :
+             {std::pair{"checkpoint", checkpoint_file()}, {"statistics", stats}})
             refuse_same_file(name, file, "denoised image", denoised_file());
     }
     check_image_extension(output);

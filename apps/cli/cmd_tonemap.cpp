@@ -6,6 +6,8 @@
 #include "commands.h"
 #include "display_options.h"
 #include "image/image_io.h"
+#include "output_checks.h"
+#include "usage_error.h"
 
 namespace etendue {
 namespace {
@@ -17,6 +19,7 @@ struct TonemapCommand {
     void run() const {
         check_image_extension(output);
         display.check();
+        refuse_same_file("image", input, "image for displays", output);
         RgbImage image = read_rgb(input, layer);
         const ToneCurve map = display.curve(finite_luminances(image.pixels));
         for (Rgb& c : image.pixels) c = map(c);

@@ -319,6 +319,9 @@ void VerifyCommand::run() {
     if (seconds > 0) options.seconds = seconds;
     if (!detect.empty()) options.detect = parse_share(detect, "--detect");
     refuse_same_file("scene", scene.file, "results", json);
+    refuse_same_file("reference", reference, "results", json);
+    for (const auto* names : {&methods, &against})
+        for (const std::string& m : *names) refuse_user_paths(m, "results", json);
     options.against.clear();
     for (const std::string& m : against) options.against.push_back(IntegratorSpec::parse(m));
     std::vector<IntegratorSpec> specs;

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "image/image_io.h"
+#include "output_checks.h"
 #include "render/learned_guide.h"
 #include "render/render_request.h"
 #include "system/output_file.h"
@@ -138,6 +139,7 @@ void GuideInfo::add_to(CLI::App& command) {
 }
 
 void GuideInfo::check() const {
+    refuse_same_file("image of shares", shares, "image of directions", directions);
     for (const std::string& file : {shares, directions})
         if (!file.empty()) {
             check_image_extension(file);

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "integrator/integrator.h"
 #include "system/output_file.h"
 #include "system/section_file.h"
 
@@ -17,6 +18,12 @@ void refuse_same_file(const char* one, const std::string& file, const char* othe
     if (file.empty() || other_file.empty() || !are_one_file(file, other_file)) return;
     throw std::runtime_error(
         fmt::format("the {} and the {} cannot be the same file: {}", one, other, other_file));
+}
+
+void refuse_user_paths(const std::string& integrator, const char* output, const std::string& file) {
+    const IntegratorSpec spec = IntegratorSpec::parse(integrator);
+    if (const auto paths = spec.params.find("user_paths"); paths != spec.params.end())
+        refuse_same_file("file of user paths", paths->second, output, file);
 }
 
 bool replaces_checkpoint(const std::string& file) {

@@ -203,6 +203,11 @@ public:
             radiance_data_uri(c_.reference.width, c_.reference.height, c_.reference.pixels);
         page["methods"] = Json::array();
         std::set<std::string> taken{"reference"};
+        // A reference that is the image of a method in an earlier report keeps its name.
+        const fs::path given = c_.reference.file;
+        std::error_code none;
+        if (fs::equivalent(given.parent_path() / ".", fs::path(file(".")), none))
+            taken.insert(given.stem().string());
         for (const Method& m : c_.methods)
             page["methods"].push_back(write_method(m, free_stem(file_stem(m.name()), taken)));
         page["plots"] = write_plots();
@@ -213,10 +218,15 @@ private:
     std::string file(const std::string& name) const {
         return (fs::path(folder_) / name_ / name).string();
     }
+    /// The reference may be that of an earlier report in the same folder, which has more layers than the image.
     void write_picture(const std::string& stem, const std::vector<Rgb>& pixels) const {
         const auto [w, h] = std::pair{c_.reference.width, c_.reference.height};
-        write_image(file(stem + ".exr"), rgb_image(w, h, pixels));
-        write_image(file(stem + ".png"), rgb_image(w, h, tone_map(pixels, mapping_)));
+        const auto write = [&](const std::string& name, const Image& image) {
+            const std::string& given = c_.reference.file;
+            if (given.empty() || !are_one_file(name, given)) write_image(name, image);
+        };
+        write(file(stem + ".exr"), rgb_image(w, h, pixels));
+        write(file(stem + ".png"), rgb_image(w, h, tone_map(pixels, mapping_)));
     }
     void write_map(const std::string& stem, const std::vector<float>& values) const {
         write_image(file(stem + ".png"),

@@ -340,7 +340,14 @@ TEST_F(CheckpointTest, NoOutputReplacesAnInput) {
           Arguments{"render", own, "-o", image, "--spp", "1", "--checkpoint", own},
           Arguments{"verify", own, "--spp", "1", "--json", own},
           Arguments{"paths", own, "--pick", "1", "--pixel", "1,1", "-o", own},
-          Arguments{"diff", path("a.exr"), path("b.exr"), "--map", path("a.exr")}}) {
+          Arguments{"diff", path("a.exr"), path("b.exr"), "--map", path("a.exr")},
+          Arguments{"tonemap", path("a.exr"), path("./a.exr")},
+          Arguments{"verify", own, "--reference", path("a.exr"), "--json", path("a.exr")},
+          Arguments{"verify", own, "--methods", "mlt:user_paths=" + a, "--json", a},
+          Arguments{"render", own, "-o", image, "--resume", a, "--checkpoint", path("c.etd"),
+                    "--stats", path("link.etd")},
+          Arguments{"render", own, "-o", image, "-i", "mlt:user_paths=" + a, "--stats", a},
+          Arguments{"render", own, "-o", image, "-i", "mlt:user_paths=" + a, "--checkpoint", a}}) {
         SCOPED_TRACE(fmt::format("{}", fmt::join(arguments, " ")));
         const ProgramResult r = run(arguments);
         EXPECT_EQ(r.status, 1);

@@ -145,6 +145,29 @@ TEST_F(CompareTest, ReadsReferencesForSeveralScenes) {
     EXPECT_NEAR(seconds, 0.2, 0.15);
 }
 
+/// They have layers that the images of reports have not.
+TEST_F(CompareTest, ReferencesInTheReportAreNotReplaced) {
+    fs::create_directories(report / "cornell");
+    for (const char* name : {"reference.exr", "path.exr"}) {
+        const std::string image = report / "cornell" / name;
+        ASSERT_EQ(Program(ETENDUE_PROGRAM,
+                          {"render", scene, "-o", image, "--spp", "4", "--resolution", "16x16",
+                           "--aov", "variance", "--quiet"},
+                          folder.path())
+                      .wait()
+                      .status,
+                  0);
+        const std::string before = read_text(image);
+        const ProgramResult r = run({scene, "--methods", "path", "--spp", "2", "--resolution",
+                                     "16x16", "--reference", image, "--techniques-max-depth", "0"});
+        ASSERT_EQ(r.status, 0) << r.errors;
+        EXPECT_TRUE(read_text(image) == before) << name;
+        fs::remove(image);
+    }
+    EXPECT_TRUE(fs::exists(report / "cornell/path-2.exr"));
+    EXPECT_TRUE(fs::exists(report / "cornell/reference.exr"));
+}
+
 TEST_F(CompareTest, RefusesBadCommandLines) {
     const std::string none = (folder.path() / "none.exr").string();
     expect_refusal({scene, "--methods", "path", "bdtp", "--spp", "1"}, "did you mean \"bdpt\"?");
