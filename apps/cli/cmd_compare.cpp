@@ -316,7 +316,9 @@ void add_compare_command(CLI::App& app) {
                  "Longest path with technique images, in edges; 0: none")
         ->capture_default_str()
         ->check(CLI::Range(0, 16));
-    c.add_option("--seed", command->seed, "Seed of the first run")->capture_default_str();
+    c.add_option("--seed", command->seed, "Seed of the first run")
+        ->capture_default_str()
+        ->check(must_be_unsigned);
     add_sampler_option(c, command->sampler);
     c.add_option("--threads", command->threads, "Number of threads; 0: one per core")
         ->capture_default_str()

@@ -17,6 +17,7 @@
 #include "image/tonemap.h"
 #include "json_text.h"
 #include "messages.h"
+#include "number_checks.h"
 #include "output_checks.h"
 #include "system/output_file.h"
 #include "usage_error.h"
@@ -139,7 +140,8 @@ void add_diff_command(CLI::App& app) {
     c.add_option("--layer", command->layer,
                  "Compare this layer, e.g. albedo, instead of the image");
     c.add_option("--ignore-above", command->ignore_above,
-                 "Leave out pixels whose reference is brighter than this radiance, such as lamps");
+                 "Leave out pixels whose reference is brighter than this radiance, such as lamps")
+        ->check(must_be_at_least_0);
     c.add_option("--flip", command->flip,
                  "Variant of FLIP: hdr, ldr or none; auto: hdr for .exr, .pfm and .hdr")
         ->capture_default_str()

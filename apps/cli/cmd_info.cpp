@@ -11,6 +11,7 @@
 #include "image/image_io.h"
 #include "json_text.h"
 #include "math/content_hash.h"
+#include "number_checks.h"
 #include "render/checkpoint.h"
 #include "render/render_request.h"
 #include "render/scene_integrator.h"
@@ -219,7 +220,8 @@ void add_info_command(CLI::App& app) {
             "Method with parameters: of --guide the one whose guide is trained (default: "
             "the scene's), of --choice `auto` with parameters, or a method with guide=auto"),
         c.add_option("--seed", options->seed, "Seed of the training, or of the choice")
-            ->capture_default_str(),
+            ->capture_default_str()
+            ->check(must_be_unsigned),
         c.add_option("--threads", options->threads, "Number of threads; 0: one per core")
             ->capture_default_str()
             ->check(CLI::Range(0, 4096))};

@@ -5,6 +5,7 @@
 
 #include "commands.h"
 #include "mcmc/pick_paths.h"
+#include "number_checks.h"
 #include "output_checks.h"
 #include "scene_options.h"
 #include "system/output_file.h"
@@ -79,6 +80,7 @@ void add_paths_command(CLI::App& app) {
         ->needs(pick);
     c.add_option("--seed", options->pick.seed, "Seed of all random numbers")
         ->capture_default_str()
+        ->check(must_be_unsigned)
         ->needs(pick);
     c.add_option("-o,--output", options->output, "JSON file to write")->needs(pick);
     c.add_option("--check", options->check,

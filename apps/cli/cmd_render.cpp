@@ -669,7 +669,7 @@ void add_render_command(CLI::App& app) {
                  "checkpoints would take more than a hundredth of the time, but a quarter of an "
                  "hour at most")
         ->default_str(fmt::format("{}", RenderCommand::kCheckpointEvery))
-        ->check(CLI::Range(0.0, 1e9));
+        ->check(must_be_within(0, 1e9));
     c.add_option(
         "--resume", command->resume,
         "Go on from this checkpoint, and save further ones in the same file if there is no "
@@ -677,13 +677,14 @@ void add_render_command(CLI::App& app) {
     c.add_option("--write-every", command->write_every,
                  "Seconds after which the image so far is written; 0: only at the end")
         ->capture_default_str()
-        ->check(CLI::Range(0.0, 1e9));
+        ->check(must_be_within(0, 1e9));
     c.add_option("--grace", command->grace,
                  "Seconds that the current pass may continue after Ctrl-C, SIGTERM or SIGHUP")
         ->capture_default_str()
         ->check(CLI::Range(0, 86400));
     c.add_option("--seed", command->request.seed, "Seed of all random numbers")
-        ->capture_default_str();
+        ->capture_default_str()
+        ->check(must_be_unsigned);
     FilterMode& filter_mode = command->request.filter_mode;
     const CLI::Option* given_mode =
         c.add_option_function<std::string>(

@@ -385,7 +385,7 @@ void add_verify_command(CLI::App& app) {
     c.add_option("--alpha", command->options.alpha,
                  "Probability of a false alarm in all comparisons together")
         ->capture_default_str()
-        ->check(CLI::Range(1e-9, 0.5));
+        ->check(must_be_within(1e-9, 0.5));
     c.add_option("--spp", command->spp,
                  "Samples per pixel of each run; with --detect, of each rendering")
         ->check(must_be_above_0);
@@ -417,7 +417,8 @@ void add_verify_command(CLI::App& app) {
         ->check(CLI::Range(1, 64));
     c.add_option("--json", command->json, "Write all results to this JSON file");
     c.add_option("--seed", command->options.seed, "Seed of all random numbers")
-        ->capture_default_str();
+        ->capture_default_str()
+        ->check(must_be_unsigned);
     c.add_option("--threads", command->options.threads,
                  "Number of runs rendered at the same time; 0: one per core")
         ->capture_default_str()

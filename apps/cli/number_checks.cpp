@@ -32,4 +32,25 @@ std::string must_be_at_least_0(const std::string& text) {
                : fmt::format("must be a number of at least 0, but is \"{}\"", text);
 }
 
+CLI::Validator must_be_within(double low, double high) {
+    // Its text in the help.
+    CLI::Validator validator = CLI::Range(low, high);
+    validator.operation([low, high](std::string& text) {
+        const auto value = number(text);
+        return value && *value >= low && *value <= high
+                   ? std::string()
+                   : fmt::format("must be a number from {} to {}, but is \"{}\"", low, high, text);
+    });
+    return validator;
+}
+
+std::string must_be_unsigned(const std::string& text) {
+    uint64_t value = 0;
+    const char* const end = text.data() + text.size();
+    const auto [last, error] = std::from_chars(text.data(), end, value);
+    return error == std::errc() && last == end
+               ? ""
+               : fmt::format("must be an integer of at least 0, but is \"{}\"", text);
+}
+
 }  // namespace etendue
