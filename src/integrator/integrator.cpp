@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <stdexcept>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -33,16 +34,33 @@ const std::vector<IntegratorEntry>& integrator_registry() {
     return entries;
 }
 
+namespace {
+
+/// The items between commas. A comma in a value, such as the name of a file, follows a backslash, and so does a backslash.
+std::vector<std::string> split_items(std::string_view text) {
+    std::vector<std::string> items(1);
+    for (size_t i = 0; i < text.size(); ++i)
+        if (text[i] == '\\' && i + 1 < text.size() && (text[i + 1] == ',' || text[i + 1] == '\\'))
+            items.back() += text[++i];
+        else if (text[i] == ',')
+            items.emplace_back();
+        else
+            items.back() += text[i];
+    return items;
+}
+
+}  // namespace
+
 IntegratorSpec IntegratorSpec::parse(const std::string& text) {
     IntegratorSpec spec;
     const size_t colon = text.find(':');
     spec.name = text.substr(0, colon);
-    for (size_t begin = colon; begin != std::string::npos && begin + 1 < text.size();) {
-        const size_t end = text.find(',', begin + 1);
-        const std::string item =
-            text.substr(begin + 1, end == std::string::npos ? end : end - begin - 1);
+    if (colon == std::string::npos || colon + 1 == text.size()) return spec;
+    std::vector<std::string> items = split_items(std::string_view(text).substr(colon + 1));
+    if (items.back().empty()) items.pop_back();
+    for (const std::string& item : items) {
         const size_t equals = item.find('=');
-        if (equals == std::string::npos || equals == 0 || equals + 1 == item.size())
+        if (equals == std::string::npos || equals == 0)
             throw std::runtime_error(fmt::format(
                 "integrator \"{}\": expected name=value after ':' or ',', but found \"{}\"",
                 spec.name, item));
@@ -50,7 +68,6 @@ IntegratorSpec IntegratorSpec::parse(const std::string& text) {
             throw std::runtime_error(
                 fmt::format("integrator \"{}\": parameter \"{}\" is given twice", spec.name,
                             item.substr(0, equals)));
-        begin = end;
     }
     return spec;
 }
@@ -59,7 +76,11 @@ std::string IntegratorSpec::to_string() const {
     std::string text = name;
     char separator = ':';
     for (const auto& [key, value] : params) {
-        text += separator + key + '=' + value;
+        text += separator + key + '=';
+        for (const char c : value) {
+            if (c == ',' || c == '\\') text += '\\';
+            text += c;
+        }
         separator = ',';
     }
     return text;

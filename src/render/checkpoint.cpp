@@ -27,12 +27,13 @@ const char* yes_or_no(bool b) {
     return b ? "yes" : "no";
 }
 
-/// The parameters with those that were not given.
+/// The parameters with those that were not given, but without names of files, of which the contents matter.
 std::string with_defaults(const IntegratorSpec& spec) {
     if (spec.make) return spec.to_string();
     IntegratorSpec full = spec;
     for (const ParamInfo& p : integrator_entry(spec.name).info.params)
         full.params.emplace(p.name, p.fallback);
+    full.params.erase("user_paths");
     return as_utf8(full.to_string());
 }
 

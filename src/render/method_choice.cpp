@@ -62,6 +62,13 @@ std::string asked_text(IntegratorSpec spec) {
     return spec.to_string();
 }
 
+/// Without the names of files, of which the contents matter.
+std::string without_files(const std::string& text) {
+    IntegratorSpec spec = IntegratorSpec::parse(text);
+    spec.params.erase("user_paths");
+    return spec.to_string();
+}
+
 /// A method, and what its last pilot has shown.
 struct Contender {
     MethodChoice::Candidate shown = {};  ///< Its method is the name, and whether there is a guide.
@@ -605,7 +612,7 @@ RenderSettings with_chosen_method(const Scene& scene, const RenderSettings& sett
 RenderSettings with_chosen_method(const RenderSettings& settings, const MethodChoice& earlier) {
     if (!is_chosen_by_pilots(settings.integrator)) return settings;
     if (const std::string asked = as_utf8(asked_text(settings.integrator));
-        asked != as_utf8(earlier.asked))
+        without_files(asked) != without_files(as_utf8(earlier.asked)))
         throw std::runtime_error(fmt::format(
             "the method was chosen by \"{}\" there, but it is to be chosen by \"{}\" here",
             earlier.asked, asked));

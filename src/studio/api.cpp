@@ -252,10 +252,10 @@ RunRequest Api::run_request(const json& body) const {
     const std::string text = text_of(body, "integrator");
     // Files are named, not addressed: they come from two folders only.
     if (IntegratorSpec spec = IntegratorSpec::parse(text.empty() ? "path" : text); !text.empty()) {
-        if (const auto file = spec.params.find("user_paths"); file != spec.params.end()) {
-            if (!file->second.empty()) {
-                request.user_paths = find_file_in(folders(), file->second);
-            }
+        // An empty name stays: without it, there are those of the scene's integrator.
+        if (const auto file = spec.params.find("user_paths");
+            file != spec.params.end() && !file->second.empty()) {
+            request.user_paths = find_file_in(folders(), file->second);
             spec.params.erase(file);
         }
         request.integrator = spec.to_string();

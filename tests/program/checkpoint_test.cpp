@@ -591,6 +591,41 @@ TEST_F(CheckpointTest, NamesThatAreNotUtf8GoOn) {
     EXPECT_EQ(info("a.etd")["spp"], 2);
 }
 
+/// The contents of user paths matter, wherever they are.
+TEST_F(CheckpointTest, UserPathsMayMove) {
+    const auto with = [&](const char* folder_name, const char* passes, const char* option,
+                          const char* state) {
+        fs::create_directories(path(folder_name));
+        const std::string paths = path(std::string(folder_name) + "/paths.json");
+        fs::copy_file(fs::path(ETENDUE_SOURCE_DIR) / "scenes/shutter-paths.json", paths,
+                      fs::copy_options::skip_existing);
+        return Arguments{"render",
+                         fs::path(ETENDUE_SOURCE_DIR) / "scenes/shutter.xml",
+                         "-o",
+                         path("a.exr"),
+                         "--quiet",
+                         "--resolution",
+                         "8x8",
+                         "-i",
+                         "mlt:groups=2,chains=16,user_paths=" + paths,
+                         "--passes",
+                         passes,
+                         option,
+                         path(state)};
+    };
+    expect_run(with("one", "0:1", "--checkpoint", "a.etd"));
+    expect_run(with("two", "0:2", "--resume", "a.etd"));
+    EXPECT_EQ(info("a.etd")["spp"], 2);
+    Arguments other = with("two", "0:2", "--checkpoint", "b.etd");
+    other.insert(other.end(), {"--seed", "1"});
+    expect_run(other);
+    expect_run({"merge", path("a.etd"), path("b.etd"), "-o", path("sum.etd"), "--quiet"});
+    std::ofstream(path("two/paths.json"), std::ios::app) << " ";
+    const ProgramResult r = run(with("two", "0:3", "--resume", "a.etd"));
+    EXPECT_EQ(r.status, 1);
+    EXPECT_NE(r.errors.find("files of the integrator"), std::string::npos) << r.errors;
+}
+
 TEST_F(CheckpointTest, TheScriptForSlurmRunsWithoutIt) {
     const std::string script = fs::path(ETENDUE_SOURCE_DIR) / "examples/slurm_array.sh";
     const auto tasks = [&](const char* spp) {

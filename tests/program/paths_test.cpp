@@ -183,6 +183,10 @@ TEST_F(PathsTest, MayBeNamedInTheScene) {
     for (const char* other : {"bdpt", "mmlt"}) EXPECT_EQ(render(other).status, 0) << other;
     EXPECT_EQ(render("mlt:user_ratio=2").status, 0);
     EXPECT_GT(report()["user_path_proposed"], 0);
+    // An empty name leaves them out.
+    ASSERT_EQ(render("mlt:user_paths=").status, 0);
+    EXPECT_EQ(report()["integrator"], "mlt:user_paths=");
+    EXPECT_FALSE(report().contains("user_path_proposed"));
     write(scene, scene_text("<string name=\"user_paths\" value=\"path.json\"/>"));
     r = render("");
     EXPECT_EQ(r.status, 1);

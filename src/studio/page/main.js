@@ -262,7 +262,7 @@ async function listWorst() {
 let afterLoad = null;
 
 /** Files are named, not addressed. */
-const kFolders = /user_paths=[^,]*\//;
+const kFolders = /user_paths=(?:\\.|[^,\\])*\//;
 
 /**
  * Has the program load the scene with another camera, region or sensor, and render it by the method that is shown.

@@ -304,8 +304,8 @@ export class PathEditor {
     async compare() {
         await this.changed();
         const request = {action: 'start', sampler: 'independent', spp: Number(this.spp.value), seeds: Number(this.seeds.value)};
-        const without = await this.tell.start({...request, integrator: 'mlt'});
-        const with_ = await this.tell.start({...request, integrator: `mlt:user_paths=${this.file}`});
+        const without = await this.tell.start({...request, integrator: 'mlt:user_paths='});
+        const with_ = await this.tell.start({...request, integrator: `mlt:user_paths=${this.file.replace(/[\\,]/g, '\\$&')}`});
         this.compared = {without, with: with_, seen: ''};
         await this.updateGain();
     }

@@ -59,6 +59,22 @@ TEST(IntegratorParams, UserPathsAndAGuideExcludeEachOther) {
     EXPECT_EQ(error_of_spec("mlt:user_paths=a.json,guide=off"), "");
 }
 
+/// Files may have any name.
+TEST(IntegratorSpec, TextsHaveAnyValues) {
+    for (const char* value : {"", "a,b.json", ",", "a\\,b", "\\", "a\\\\", "a=b,max_depth=3"}) {
+        const IntegratorSpec spec{"mlt", {{"max_depth", "5"}, {"user_paths", value}, {"z", "1"}}};
+        const IntegratorSpec read = IntegratorSpec::parse(spec.to_string());
+        EXPECT_EQ(read.params, spec.params) << spec.to_string();
+    }
+    EXPECT_EQ(IntegratorSpec::parse("mlt:user_paths=a\\b").params.at("user_paths"), "a\\b");
+    EXPECT_EQ(IntegratorSpec::parse("mlt:").params.size(), 0u);
+    EXPECT_EQ(IntegratorSpec::parse("mlt:max_depth=3,").params.size(), 1u);
+    EXPECT_NE(error_of_spec("mlt:max_depth=").find("\"max_depth\" must be"), std::string::npos);
+    EXPECT_NE(error_of_spec("mlt:,max_depth=3").find("expected name=value"), std::string::npos);
+    EXPECT_NE(error_of_spec("mlt:=3").find("expected name=value"), std::string::npos);
+    EXPECT_NE(error_of_spec("mlt:max_depth").find("expected name=value"), std::string::npos);
+}
+
 TEST(IntegratorParams, RouletteMustEndWalks) {
     for (const char* name : {"path", "light", "bdpt", "upg", "pcbpt"}) {
         const std::string spec = std::string(name) + ":rr_depth=1000000";
