@@ -226,11 +226,24 @@ void add_info_command(CLI::App& app) {
             ->capture_default_str()
             ->check(CLI::Range(0, 4096))};
     c.add_flag("--json", options->json, "Print JSON");
-    c.callback([options, of_both] {
+    std::vector<const CLI::Option*> of_scenes;
+    for (const char* name :
+         {"--define", "--lenient", "--watertight", "--sensor", "--resolution", "--crop"})
+        of_scenes.push_back(c.get_option(name));
+    c.callback([options, of_both, of_scenes] {
         for (const CLI::Option* option : of_both)
             if (option->count() > 0 && !options->guide.is_wanted && !options->choice.is_wanted)
                 throw UsageError(
                     fmt::format("{} requires --guide or --choice", option->get_name()));
+        // Those of scenes.
+        const std::string& file = options->scene.file;
+        const bool is_checkpoint = SectionReader::is_one(file);
+        if (is_checkpoint || is_image(file))
+            for (const CLI::Option* option : of_scenes)
+                if (option->count() > 0)
+                    throw UsageError(fmt::format("{} needs a scene, but {} is {}",
+                                                 option->get_name(), file,
+                                                 is_checkpoint ? "a checkpoint" : "an image"));
         info(*options);
     });
 }

@@ -87,14 +87,17 @@ void add_list_command(CLI::App& app) {
     auto command = std::make_shared<ListCommand>();
     CLI::App& c = *app.add_subcommand(
         "list", "List integrators and all plug-ins of scene files, with parameters and defaults");
-    c.add_option("CATEGORY", command->category, "List only this category, e.g. bsdf");
-    c.add_option("NAME", command->name, "List only this plug-in of the category, e.g. diffuse");
+    CLI::Option* category =
+        c.add_option("CATEGORY", command->category, "List only this category, e.g. bsdf");
+    CLI::Option* name =
+        c.add_option("NAME", command->name, "List only this plug-in of the category, e.g. diffuse");
     CLI::Option* markdown = c.add_flag("--markdown", command->markdown, "Print Markdown");
-    c.add_flag(
+    CLI::Option* mitsuba = c.add_flag(
         "--mitsuba", command->mitsuba,
         "Print, in Markdown, the support of each plug-in and parameter in the manuals of Mitsuba "
         "0.6 and 3");
-    c.add_flag("--json", command->json, "Print JSON")->excludes(markdown);
+    CLI::Option* json = c.add_flag("--json", command->json, "Print JSON")->excludes(markdown);
+    for (CLI::Option* other : {category, name, json}) mitsuba->excludes(other);
     c.callback([command] { command->run(); });
 }
 

@@ -35,6 +35,9 @@ struct MergeCommand {
         if (!is_image && has_variance)
             throw UsageError(
                 fmt::format("--variance adds a layer to an image, but {} is none", output));
+        if (has_variance && image_extension(output) != ".exr")
+            throw UsageError(
+                fmt::format("--variance: {} would have no layers; an .exr file has them", output));
         refuse_same_file("sum", output, "statistics", stats);
         for (const std::string& file : files) {
             refuse_same_file("sum", output, "checkpoint", file);

@@ -36,7 +36,12 @@ void add_tonemap_command(CLI::App& app) {
     c.add_option("OUTPUT", command->output, "Image to write, usually .png")->required();
     command->display.add_to_tonemap(c);
     c.add_option("--layer", command->layer, "Read this layer, e.g. albedo, instead of the image");
-    c.callback([command] { command->run(); });
+    const CLI::Option* const white = c.get_option("--white");
+    c.callback([command, white] {
+        if (white->count() > 0 && command->display.op != "reinhard")
+            throw UsageError("--white applies to --operator reinhard only");
+        command->run();
+    });
 }
 
 }  // namespace etendue

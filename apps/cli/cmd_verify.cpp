@@ -377,8 +377,8 @@ void add_verify_command(CLI::App& app) {
     c.add_option("--methods", command->methods,
                  "Integrators with parameters, as for render -i, separated by spaces")
         ->capture_default_str();
-    c.add_option("--lengths", command->lengths, "Path lengths to compare, in edges")
-        ->capture_default_str();
+    auto* lengths = c.add_option("--lengths", command->lengths, "Path lengths to compare, in edges")
+                        ->capture_default_str();
     c.add_option("--runs", command->options.runs, "Independent renderings of each method")
         ->capture_default_str()
         ->check(CLI::Range(8, 4096));
@@ -411,7 +411,8 @@ void add_verify_command(CLI::App& app) {
     c.add_option("--reference", command->reference,
                  "Reference image, an .exr with a layer \"variance\", instead of --against")
         ->excludes(against)
-        ->excludes(detect);
+        ->excludes(detect)
+        ->excludes(lengths);
     c.add_option("--tiles", command->options.tiles, "Number of tiles along each side of the image")
         ->capture_default_str()
         ->check(CLI::Range(1, 64));

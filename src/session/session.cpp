@@ -564,6 +564,9 @@ void Session::resume(int id, const RenderLimits& limits) {
         const std::lock_guard lock(mutex_);
         if (is_closed_) throw std::runtime_error("the program is about to end");
         auto found = find(id);
+        if (found->has_seeds() && (limits.spp || limits.seconds || limits.error))
+            throw std::runtime_error(fmt::format(
+                "run {} has several seeds and goes on with more of them; it takes no limit", id));
         if (const std::string& why = found->status.why_look_only; !why.empty())
             throw std::runtime_error(fmt::format("run {} can only be looked at: {}", id, why));
         return found;

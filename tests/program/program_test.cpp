@@ -282,6 +282,10 @@ TEST_F(ProgramTest, RefusesBadCommandLines) {
     expect_refusal({"render", s, "--error", "0"}, "error");
     expect_refusal({"render", s, "--time=-1"}, "must be a number above 0, but is \"-1\"");
     expect_refusal({"render", s, "--time", "nan"}, "must be a number above 0, but is \"nan\"");
+    for (const char* option : {"--checkpoint-every", "--write-every"})
+        for (const char* value : {"nan", "inf", "-1"})
+            expect_refusal({"render", s, option, value},
+                           fmt::format("{}: must be a number from 0 to", option));
     expect_refusal({"render", s, "--threads", "-2"}, "threads");
     expect_refusal({"render", s, "--sampler", "sobl"}, "sampler");
     expect_refusal({"render", s, "--aov", "albdo"}, "albdo");
@@ -295,6 +299,43 @@ TEST_F(ProgramTest, RefusesBadCommandLines) {
     expect_refusal({"render"}, "SCENE");
     expect_refusal({"paint", s}, "there is no command \"paint\"");
     expect_refusal({}, "subcommand");
+}
+
+TEST_F(ProgramTest, RefusesOptionsThatHaveNoMeaning) {
+    const std::string s = scene.string(), picture = folder.path() / "picture.exr";
+    write_image(picture, rgb_image(2, 1, std::vector<Rgb>(2, Rgb(1))));
+    const auto refuse = [&](const std::vector<std::string>& arguments, const std::string& message) {
+        SCOPED_TRACE(fmt::format("etendue {}", fmt::join(arguments, " ")));
+        const ProgramResult r = run(arguments);
+        EXPECT_EQ(r.status, 2);
+        EXPECT_NE(r.errors.find(message), std::string::npos) << r.errors;
+        EXPECT_EQ(r.output, "");
+    };
+    refuse({"verify", s, "--alpha", "nan"}, "--alpha: must be a number from 1e-09 to 0.5");
+    refuse({"diff", s, s, "--ignore-above", "nan"}, "--ignore-above: must be a number");
+    for (const std::vector<std::string>& command : {std::vector<std::string>{"render", s},
+                                                    {"verify", s},
+                                                    {"compare", s, "-m", "path", "--spp", "1"},
+                                                    {"paths", s, "--pick", "1"},
+                                                    {"info", s, "--choice"}}) {
+        std::vector<std::string> all = command;
+        all.insert(all.end(), {"--seed", "-1"});
+        refuse(all, "--seed: must be an integer of at least 0, but is \"-1\"");
+    }
+    refuse({"verify", s, "--reference", "a.exr", "--lengths", "2..3"}, "--lengths");
+    refuse({"merge", "a.etd", "-o", "m.png", "--variance"}, "would have no layers");
+    for (const std::vector<std::string>& more : {std::vector<std::string>{"--crop", "0,0,1,1"},
+                                                 {"-D", "foo=1"},
+                                                 {"--sensor", "9"},
+                                                 {"--resolution", "1x1"},
+                                                 {"--lenient"}}) {
+        std::vector<std::string> all{"info", picture};
+        all.insert(all.end(), more.begin(), more.end());
+        refuse(all, "needs a scene, but");
+    }
+    for (const char* more : {"bsdf", "--json"}) refuse({"list", "--mitsuba", more}, "--mitsuba");
+    refuse({"tonemap", picture, folder.path() / "a.png", "--white", "3"},
+           "--white applies to --operator reinhard only");
 }
 
 TEST_F(ProgramTest, RefusesOutputsThatCannotBeWritten) {

@@ -571,7 +571,8 @@ function act(action, run) {
     /** @type {any} */
     const request = {action, run};
     // A run that has reached its limit goes on to the double of it.
-    if (action === 'continue' && r?.state === 'finished') request.spp = 2 * r.passes;
+    // One with several seeds goes on with more of them.
+    if (action === 'continue' && r?.state === 'finished' && r.seeds[1] === 1) request.spp = 2 * r.passes;
     report(server.post('/v1/run', request));
 }
 

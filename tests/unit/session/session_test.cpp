@@ -361,6 +361,8 @@ TEST(Session, SeveralSeedsAreRenderedOneAfterTheOther) {
     EXPECT_EQ(status.interval, IntervalKind::None);
     EXPECT_EQ(session.status(other).state, RunState::Rendering);
     session.stop(other);
+    EXPECT_THROW(session.resume(run, {.spp = 8, .seconds = {}, .error = {}}), std::runtime_error);
+    EXPECT_EQ(session.status(run).seeds, 3);
     // Continuing adds as many seeds again, also through a stop.
     session.resume(run, {});
     session.stop(run);
