@@ -73,11 +73,11 @@ void StudioCommand::start_first_run(Session& session) const {
     }
 }
 
-Saved save_and_wait(Session& session, int run, const std::string& file) {
+Saved save_and_wait(Session& session, int run, const std::string& file, bool replaces = false) {
     auto answer = std::make_shared<std::promise<Saved>>();
     std::future<Saved> saved = answer->get_future();
     try {
-        session.save(run, file, false, [answer](const Saved& s) { answer->set_value(s); });
+        session.save(run, file, replaces, [answer](const Saved& s) { answer->set_value(s); });
         answer.reset();  // Without memory there may be no answer; its last owner tells so.
         return saved.get();
     } catch (const std::exception&) {
@@ -92,13 +92,23 @@ void StudioCommand::save_all(Session& session) const {
     std::error_code ignored;
     const std::string other = std::filesystem::temp_directory_path(ignored).string();
     std::string errors;
+    struct File {
+        RunStatus run;
+        std::string name;
+        uint64_t passes;
+    };
+    std::vector<File> files;
+    const auto tell = [](const RunStatus& s, const std::string& file, const Saved& saved) {
+        message("{}: run {}, {}, {} spp\n", file, s.id, s.request.integrator, saved.passes);
+    };
     const auto save_one = [&](const RunStatus& s) {
         for (const std::string& folder : {output, other}) {
             if (folder.empty()) continue;  // There is none for temporary files.
             const std::string file = free_name(folder, stem);
             const Saved saved = save_and_wait(session, s.id, file);
             if (saved.error.empty()) {
-                message("{}: run {}, {}, {} spp\n", file, s.id, s.request.integrator, saved.passes);
+                tell(s, file, saved);
+                files.push_back({s, file, saved.passes});
                 return;
             }
             // A run in its first pass may have been discarded.
@@ -118,6 +128,16 @@ void StudioCommand::save_all(Session& session) const {
         } catch (const std::exception& e) {
             // Such as that the page has removed the run.
             message("run {}: {}\n", s.id, e.what());
+        }
+    // A pass that was in flight may be finished since.
+    if (std::ranges::any_of(files, [](const File& f) { return f.run.state == RunState::Stopping; }))
+        session.settle();
+    for (const File& f : files) try {
+            if (session.status(f.run.id).passes <= f.passes) continue;
+            const Saved saved = save_and_wait(session, f.run.id, f.name, true);
+            if (saved.error.empty()) tell(f.run, f.name, saved);
+        } catch (const std::exception& e) {
+            message("run {}: {}\n", f.run.id, e.what());
         }
     if (!errors.empty()) throw std::runtime_error(errors);
 }
