@@ -42,7 +42,7 @@ void PathsCommand::run() {
     if (check.empty() == (count == 0))
         throw UsageError("paths: expected either --pick N or --check FILE");
     if (count > 0 && (pixel.empty() || output.empty()))
-        throw std::runtime_error("paths: --pick needs --pixel x,y and -o FILE");
+        throw UsageError("paths: --pick needs --pixel x,y and -o FILE");
     refuse_same_file("scene", scene.file, "paths", output);
     const Scene s = load_scene(scene);
     if (count == 0) return check_paths(s, check);

@@ -86,6 +86,10 @@ nb::tuple sample_paths(const ScenePtr& scene, size_t n, nb::handle integrator, u
                 background.stop, recorder.is_full);
         },
         [] {});
+    if (background.interrupted) {
+        PyErr_SetNone(PyExc_KeyboardInterrupt);
+        throw nb::python_error();
+    }
     const auto bytes = [](const void* data, size_t size) {
         return nb::bytes(static_cast<const char*>(data), size);
     };

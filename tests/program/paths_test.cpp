@@ -169,6 +169,7 @@ TEST_F(PathsTest, PickRefusesWhatItCannotDo) {
     };
     expect({}, "expected either --pick N or --check FILE");
     expect({"--pick", "3", "-o", paths}, "--pick needs --pixel x,y and -o FILE");
+    EXPECT_EQ(run({"paths", scene, "--pick", "3"}).status, 2);
     expect({"--pick", "3", "--pixel", "16,2", "-o", paths}, "pixel 16,2 lies outside the image");
     expect({"--pick", "3", "--pixel", "8,0", "--length", "2", "--samples", "100", "-o", paths},
            "none of 100 samples found light for pixel 8,0");

@@ -426,6 +426,24 @@ def test_interrupted_verifications_return_what_they_have(scenes: Path) -> None:
     assert output.startswith("True path"), output
 
 
+SAMPLING = """
+import os, signal, threading
+import etendue as et
+from etendue import core
+signal.signal(signal.SIGINT, signal.default_int_handler)
+scene = et.load({scene!r}).build(resolution=(8, 8))
+threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+try:
+    print(len(core.sample_paths(scene, 10**9)))
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
+def test_sampled_paths_are_complete_or_interrupted(scenes: Path) -> None:
+    assert _child(SAMPLING.format(scene=str(scenes / "cornell.xml"))) == "interrupted\n"
+
+
 def test_reports_keep_what_does_not_fail(cornell: et.Scene, tmp_path: Path) -> None:
     fails = "vcm:memory=1,light_paths=40000"
     with pytest.warns(RuntimeWarning, match="1 MiB"):
