@@ -44,7 +44,7 @@ struct MergeCommand {
             refuse_same_file("statistics", stats, "checkpoint", file);
         }
         // A sum can replace an earlier one, but no other file: a rendering cannot go on from it.
-        if (!is_image && replaces_checkpoint(output) && !CheckpointFile(output).header().is_merged)
+        if (!is_image && replaces_checkpoint(output) && CheckpointFile(output).has_state())
             throw std::runtime_error(fmt::format(
                 "{} is not replaced by a sum, since it is the checkpoint of a rendering", output));
         OutputFile::check(output);

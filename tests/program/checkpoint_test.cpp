@@ -389,7 +389,7 @@ TEST_F(CheckpointTest, NothingElseIsReplacedByACheckpoint) {
     EXPECT_TRUE(read_text(state) == before);
     // The warning says from what a rendering could go on.
     for (const auto& [file, more, says] :
-         {std::tuple{sum, Arguments{}, "it is the sum of several renderings"},
+         {std::tuple{sum, Arguments{}, "it contains the sums of a rendering"},
           {state, Arguments{"--seed", "3"}, "seed: \"0\" there, but \"3\" here"}}) {
         const ProgramResult r = run(arguments(file, more));
         EXPECT_EQ(r.status, 0);
