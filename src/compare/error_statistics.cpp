@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "math/vec.h"
+
 namespace etendue {
 namespace {
 
@@ -64,12 +66,13 @@ std::optional<Efficiency> relative_efficiency(std::span<const double> base,
 }
 
 Interval ratio_interval(double ratio, const SquaredError& x, const SquaredError& r) {
-    const SquaredError errors[] = {x, r};
-    const SquaredError error = sum(errors);
-    // The quantile of unknown errors does not exist.
-    const double half = std::isfinite(error.value) ? student_quantile(0.05, error.dof) *
-                                                         std::fabs(ratio) * std::sqrt(error.value)
-                                                   : error.value;
+    double squared = 0;
+    for (const SquaredError& e : {x, r})
+        // The quantile of unknown errors does not exist.
+        squared += std::isfinite(e.value) && e.value > 0
+                       ? sqr(student_quantile(0.05, e.dof)) * e.value
+                       : e.value;
+    const double half = std::isfinite(squared) ? std::fabs(ratio) * std::sqrt(squared) : squared;
     return {ratio, ratio - half, ratio + half};
 }
 

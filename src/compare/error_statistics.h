@@ -37,7 +37,8 @@ std::optional<Efficiency> relative_efficiency(std::span<const double> base,
                                               std::span<const double> method);
 
 /// Interval of the ratio X / R of two independent means, from the squares of their relative standard errors. It is infinite
-/// where one of them is.
+/// where one of them is. The squares of the two half widths are added: with few samples of one mean and many of the other, the degrees of
+/// freedom of Welch make it too narrow.
 Interval ratio_interval(double ratio, const SquaredError& x, const SquaredError& r);
 
 }  // namespace etendue

@@ -487,7 +487,7 @@ async function pathPart() {
         const gain = await browser.evaluate('studio.editor().gain.textContent');
         console.log(`     ${gain}`);
         const [without, with_] = await browser.evaluate('[studio.editor().compared.without, studio.editor().compared.with].map(id => [id, studio.runs.get(id).integrator])');
-        check(without[1] === 'mlt' && with_[1].startsWith('mlt:user_paths='), `without and with: ${without}; ${with_}`);
+        check(without[1] === 'mlt:user_paths=' && with_[1].startsWith('mlt:user_paths='), `without and with: ${without}; ${with_}`);
         const series = await browser.evaluate(`studio.server.get('/v1/gain?without=${without[0]}&with=${with_[0]}')`);
         check(gain.includes(`1/${Number(series.gain[0].toPrecision(3))} of the time`), `the gain is that of the paths: ${series.gain}`);
         check(await browser.evaluate("[...document.querySelectorAll('#editor tr')].find(r => r.textContent.startsWith('user path')).children[1].textContent") === '–', 'the run without them has no user paths');
