@@ -182,7 +182,8 @@ TEST_F(ImagesTest, ArePartOfTheReport) {
     EXPECT_EQ(m["runs"][1]["checkpoints"][1]["seconds"], 1);
     EXPECT_EQ(m["summary"]["seconds"], 2);
     EXPECT_NEAR(m["summary"]["mean_ratio"]["value"].get<double>(), 2, 0.4);
-    EXPECT_GT(m["summary"]["mean_ratio"]["low_95"].get<double>(), 1);
+    // Of two images, the error of the mean has one degree of freedom.
+    EXPECT_LT(m["summary"]["mean_ratio"]["low_95"].get<double>(), 1);
     EXPECT_TRUE(fs::exists(path("report/cornell/other.exr")));
     EXPECT_NE(read_text(path("report/report.html")).find("\"other\""), std::string::npos);
 

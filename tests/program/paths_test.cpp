@@ -186,7 +186,7 @@ TEST_F(PathsTest, MayBeNamedInTheScene) {
     EXPECT_GT(report()["user_path_proposed"], 0);
     // An empty name leaves them out.
     ASSERT_EQ(render("mlt:user_paths=").status, 0);
-    EXPECT_EQ(report()["integrator"], "mlt:user_paths=");
+    EXPECT_EQ(report()["integrator"], "mlt:max_depth=6,user_paths=");
     EXPECT_FALSE(report().contains("user_path_proposed"));
     write(scene, scene_text("<string name=\"user_paths\" value=\"path.json\"/>"));
     r = render("");

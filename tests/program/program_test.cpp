@@ -533,8 +533,10 @@ TEST_F(ProgramTest, VerifiesMethods) {
     const fs::path report = folder.path() / "report.json";
     const auto with = [&](const std::vector<std::string>& more) {
         std::vector<std::string> all = {"verify", scene.string(), "-D", "size=8", "--spp", "16"};
-        if (std::find(more.begin(), more.end(), "--lengths") == more.end())
-            all.insert(all.end(), {"--lengths", "1..4"});
+        const auto has = [&](const char* option) {
+            return std::find(more.begin(), more.end(), option) != more.end();
+        };
+        if (!has("--lengths") && !has("--reference")) all.insert(all.end(), {"--lengths", "1..4"});
         all.insert(all.end(), more.begin(), more.end());
         return run(all);
     };

@@ -637,9 +637,9 @@ TEST_F(StudioTest, CtrlCKeepsRuns) {
     const uint64_t passes = kept[0]["passes"];
     EXPECT_GT(passes, 0u);
     // The image has the pass that was finished after Ctrl-C.
-    EXPECT_EQ(std::get<double>(
-                  read_image(fs::path(output) / "box-1.exr").attributes.at("etendue.spp")),
-              double(passes));
+    EXPECT_EQ(
+        std::get<double>(read_image(fs::path(output) / "box-1.exr").attributes.at("etendue.spp")),
+        double(passes));
     EXPECT_EQ(post("/v1/run", {{"action", "open"}, {"file", kept[0]["file"]}}).status, 200);
     EXPECT_EQ(wait_for_run(1, "stopped")["passes"], passes);
     // What was only opened is written nowhere again.
