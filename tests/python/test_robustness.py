@@ -431,7 +431,7 @@ import os, signal, threading
 import etendue as et
 from etendue import core
 signal.signal(signal.SIGINT, signal.default_int_handler)
-scene = et.load({scene!r}).build(resolution=(8, 8))
+scene = et.load({scene!r}).build(resolution=(512, 512))
 threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
 try:
     print(len(core.sample_paths(scene, 10**9)))
