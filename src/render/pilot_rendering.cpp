@@ -119,7 +119,8 @@ void add_replicate(const Scene& small, RenderSettings settings, uint64_t first, 
     pilot.pairs_an_eye_path += double(stats.pairs - first_stats.pairs) /
                                std::max(1.0, double(stats.eye_paths - first_stats.eye_paths)) /
                                replicates;
-    pilot.pair_seconds += (cost(of_pairs(stats)) - cost(of_pairs(first_stats))) / passes / replicates;
+    pilot.pair_seconds +=
+        (cost(of_pairs(stats)) - cost(of_pairs(first_stats))) / passes / replicates;
     pilot.prepared_seconds += prepared;
     pilot.all_seconds += prepared + seconds;
     pilot.start_seconds +=

@@ -21,9 +21,9 @@ struct MethodPilot {
     /// Of what passes take more than that at the beginning: of chains their start, of other methods the first pass, which
     /// knows nothing of the image.
     double start_seconds = 0;
-    double pair_seconds = 0;      ///< Of the part of pass_seconds that pairs of gathers take.
-    double prepared_seconds = 0;  ///< Of what the first replicate prepares for all of them.
-    double all_seconds = 0;       ///< Of all of it.
+    double pair_seconds = 0;       ///< Of the part of pass_seconds that pairs of gathers take.
+    double prepared_seconds = 0;   ///< Of what the first replicate prepares for all of them.
+    double all_seconds = 0;        ///< Of all of it.
     double pairs_an_eye_path = 0;  ///< Those that are found after the first pass.
     /// It would have taken more than it was allowed to. Then there are no images.
     bool is_stopped = false;
